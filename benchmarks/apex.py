@@ -16,7 +16,6 @@ import numpy as np
 from calib_core.proposing.apex import Apex, find_apex
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
-from calib_core.synthetic.rendering.frames import FrameRenderer
 from tests.unit.proposing.trihedral import background, draw_look, picture
 
 _SCENES = ("rooftop", "field", "aisle", "checkerboard")
@@ -102,12 +101,11 @@ def _simulated(seed: int) -> Iterator[Place]:
         for width_px, height_px in _SIZES:
             options = SimulationOptions(seed=seed, scene=scene, width_px=width_px, height_px=height_px)
             recording = simulate(options)
-            renderer = FrameRenderer.of(recording.stage.scene, recording.stage.rig, options.surroundings)
             rng = np.random.default_rng(seed)
             times = recording.stage.frame_times
             for placement in recording.placements:
                 moment_s = float(times.moment_s[int(np.argmin(np.abs(times.header_ns - placement.best_image_time)))])
-                clean = renderer.render(
+                clean = recording.renderer.render(
                     recording.stage.story.at(moment_s), noise_grey=float(rng.uniform(0.0, 3.0)), rng=rng
                 )
                 image = _compressed(clean, int(rng.integers(60, 96)))

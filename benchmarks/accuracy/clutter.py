@@ -13,7 +13,8 @@ from calib_core.options import CalibrationOptions
 from calib_core.paper.algorithm_1 import pair_as_printed, static_returns_as_printed
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration
-from calib_core.synthetic import AISLE, RadarProfile, Rig
+from calib_core.synthetic import AISLE, Rig
+from calib_core.synthetic.radar_returns import RadarProfile
 
 __all__ = ["ROWS", "SCENES", "measure_clutter", "section"]
 

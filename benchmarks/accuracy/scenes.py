@@ -6,9 +6,9 @@ import numpy as np
 
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import FIELD, RADAR_PROFILES, PairsLayout, RadarProfile, Rig, random_rig
+from calib_core.synthetic import FIELD, RADAR_PROFILES, PairsLayout, Rig, random_rig
 from calib_core.synthetic.options import RadarName
-from calib_core.synthetic.radar_returns import Targets, measure
+from calib_core.synthetic.radar_returns import RadarProfile, Targets, measure
 from calib_core.synthetic.simulated_pairs import draw_positions, study_camera
 
 __all__ = ["PLACEMENTS", "SCANS", "Scene", "Windows", "draw_windows"]

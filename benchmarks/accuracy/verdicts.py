@@ -20,7 +20,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
-from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, simulate_pairs, simulate_scans
+from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, simulate, simulate_pairs
 from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
@@ -90,8 +90,8 @@ def _drawn(case: Verdicts, rng: np.random.Generator) -> SimulatedPairs:
 
 def measure_recording(preset: PresetName, trial: int) -> Figures:
     """Solve the example clicks of a simulated recording, and compare likewise at its own placements."""
-    simulated = simulate_scans(replace(PRESETS[preset], seed=_FIRST_SEED + trial))
-    outcome = calibrate(simulated.clicks, simulated.scans, simulated.published_camera, background=simulated.scans)
+    simulated = simulate(replace(PRESETS[preset], seed=_FIRST_SEED + trial))
+    outcome = calibrate(simulated.clicks, simulated.scans, simulated.stage.published_camera, background=simulated.scans)
     truth = simulated.stage.camera_from_reported
     points_radar_m = truth.inverse() @ (simulated.camera_from_radar @ simulated.points_radar_m)
     if PRESETS[preset].defects.elevation == "measured":

@@ -3,10 +3,11 @@
 import cv2
 import numpy as np
 
+from benchmarks.boards import render_board
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, Pictures, drawn_series
 from benchmarks.intrinsics.tables import Table
 from calib_core.intrinsics import Board, BoardSearch, CalibratedLens, calibrate_lens, search_boards
-from calib_core.synthetic.boards import render_board, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["bad_view_table", "planted", "used_pictures"]
 

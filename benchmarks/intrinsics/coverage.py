@@ -5,19 +5,55 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.boards import BoardFilm, true_corners
 from benchmarks.intrinsics.draws import CHECKERBOARD, LENSES, Pictures, Series, drawn_camera, moved
 from benchmarks.intrinsics.rendered import scaled_errors
 from benchmarks.intrinsics.tables import Table
+from calib_core.arrays import Points2
 from calib_core.camera import Camera, CameraModel
 from calib_core.intrinsics import BoardSearch, CalibratedLens, calibrate_lens
+from calib_core.intrinsics.board_detection import BoardCorners
 from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance
-from calib_core.synthetic.boards import BoardFilm, BoardShape, CornerErrors, simulated_views, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["CASES", "Case", "coverage", "drawn_search", "sigma_table"]
 
 _CHI2_95 = 5.991
 """With two degrees of freedom."""
-_INDEPENDENT, _IDEAL = CornerErrors(0.1), BoardFilm()
+_SHARED_OVER = 0.3
+"""Distance over which neighbours share an error, as a share of the board's diagonal in the picture."""
+_GROSS_PX = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class CornerErrors:
+    """How found corners differ from the true ones.
+
+    Attributes:
+        sigma_px: standard deviation of independent errors, per axis.
+        shared_px: standard deviation of errors that neighbouring corners of a view share, per axis.
+        gross_share: share of the corners with a gross error.
+    """
+
+    sigma_px: float = 0.1
+    shared_px: float = 0.0
+    gross_share: float = 0.0
+
+    def drawn(self, rng: np.random.Generator, pixels_px: Points2) -> Points2:
+        """Draw the errors of corners (n, 2)."""
+        drawn = self.sigma_px * rng.standard_normal(pixels_px.shape)
+        if self.shared_px:
+            apart = np.linalg.norm(pixels_px[:, None] - pixels_px[None], axis=2)
+            reach = _SHARED_OVER * float(np.linalg.norm(np.ptp(pixels_px, axis=0)))
+            values, vectors = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
+            mixed = vectors * np.sqrt(np.maximum(values, 0.0))
+            drawn += self.shared_px * mixed @ rng.standard_normal(pixels_px.shape)
+        gross = rng.uniform(size=len(pixels_px)) < self.gross_share
+        drawn[gross] += _GROSS_PX * rng.standard_normal((int(gross.sum()), 2))
+        return drawn
+
+
+_INDEPENDENT, _IDEAL = CornerErrors(), BoardFilm()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +69,9 @@ class Case:
 CASES = {
     "independent 0.1 px": Case(),
     "independent 0.1 px, model chosen": Case(chosen=True),
-    "and 0.05 px shared by neighbours": Case(CornerErrors(0.1, shared_px=0.05)),
-    "and 0.5 % gross errors": Case(CornerErrors(0.1, outlier_share=0.005)),
-    "bent by 1.5 mm": Case(film=BoardFilm(shape=BoardShape(bend_m=(0.0015, 0.0007)))),
+    "and 0.05 px shared by neighbours": Case(CornerErrors(shared_px=0.05)),
+    "and 0.5 % gross errors": Case(CornerErrors(gross_share=0.005)),
+    "bent by 1.5 mm": Case(film=BoardFilm(bend_m=(0.0015, 0.0007))),
     "rolling shutter of 20 ms": Case(film=BoardFilm(rolling_shutter_s=0.02)),
 }
 
@@ -45,15 +81,15 @@ def drawn_search(seed: Sequence[int], model: CameraModel, case: Case, views: int
     rng = np.random.default_rng(list(seed))
     camera = drawn_camera(rng, model)
     poses = waved_poses(rng, CHECKERBOARD, camera, views)
-    found = [
-        simulated_views(rng, CHECKERBOARD, camera, [pose], case.errors, moved(rng, case.film))[0] for pose in poses
-    ]
-    numbered = tuple(
-        type(view)(index, f"view {index + 1}", None, view.size_px, view.corner_ids, view.pixels_px)
-        for index, view in enumerate(found)
-    )
     size_px = camera.width_px, camera.height_px
-    return Series(camera, CHECKERBOARD, Pictures((), ()), ()), BoardSearch(CHECKERBOARD, size_px, numbered, (), views)
+    found = []
+    for index, pose in enumerate(poses):
+        pixels = true_corners(CHECKERBOARD, camera, pose, moved(rng, case.film))
+        pixels = pixels + case.errors.drawn(rng, pixels)
+        ids = np.flatnonzero(camera.in_image(pixels))
+        found.append(BoardCorners(index, f"view {index + 1}", None, size_px, ids, pixels[ids]))
+    search = BoardSearch(CHECKERBOARD, size_px, tuple(found), (), views)
+    return Series(camera, CHECKERBOARD, Pictures((), ()), ()), search
 
 
 def coverage(first: int, draws: int, lens: CameraModel, case: Case, number: int) -> tuple[str, ...]:

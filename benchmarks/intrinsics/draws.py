@@ -5,20 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.boards import BoardFilm, render_board, true_corners
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics import Board
 from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import (
-    BoardFilm,
-    BoardShape,
-    CornerErrors,
-    Waving,
-    render_board,
-    true_corners,
-    waved_poses,
-)
+from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Pictures", "Series", "drawn_camera", "drawn_series", "moved"]
 
@@ -33,12 +26,12 @@ _USUAL = BoardFilm(blur_px=0.7, noise_grey=2.0)
 FILMS: Mapping[str, BoardFilm] = {
     "clean": BoardFilm(),
     "blur and noise": _USUAL,
-    "bent board": replace(_USUAL, shape=BoardShape(bend_m=(0.0015, 0.0007))),
+    "bent board": replace(_USUAL, bend_m=(0.0015, 0.0007)),
     "changing light": replace(_USUAL, gradient=(0.35, -0.2), vignetting=0.4),
     "rolling shutter": replace(_USUAL, rolling_shutter_s=0.02),
 }
-_HELD = Waving()
-_DRIFT = CornerErrors(speed_mps=0.03, turning_radps=0.08)
+_SPEED_MPS, _TURNING_RADPS = 0.03, 0.08
+"""Standard deviations, per axis, of how a board moves that is held as still as one can."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +83,12 @@ def drawn_camera(rng: np.random.Generator, model: CameraModel, *, width_px: int 
     return replace(usual, matrix_px=matrix, distortion=usual.distortion * rng.uniform(0.7, 1.2))
 
 
-def moved(rng: np.random.Generator, film: BoardFilm, errors: CornerErrors = _DRIFT) -> BoardFilm:
+def moved(rng: np.random.Generator, film: BoardFilm) -> BoardFilm:
     """Return the film with a board that does not quite stand still, if its rows are exposed one after the other."""
     if not film.rolling_shutter_s:
         return film
-    x, y, z = (errors.speed_mps * rng.standard_normal(3)).tolist()
-    a, b, c = (errors.turning_radps * rng.standard_normal(3)).tolist()
+    x, y, z = (_SPEED_MPS * rng.standard_normal(3)).tolist()
+    a, b, c = (_TURNING_RADPS * rng.standard_normal(3)).tolist()
     return replace(film, velocity_mps=(x, y, z), turning_radps=(a, b, c))
 
 
@@ -114,12 +107,11 @@ def drawn_series(
     *,
     board: Board = CHECKERBOARD,
     views: int = 20,
-    held: Waving = _HELD,
 ) -> Series:
     """Draw and render a board before a lens."""
     rng = np.random.default_rng(list(seed))
     camera = drawn_camera(rng, model)
-    poses = waved_poses(rng, board, camera, views, held)
+    poses = waved_poses(rng, board, camera, views)
     films = [changed_light(rng, moved(rng, film)) for _ in poses]
     pixels = [
         render_board(board, camera, pose, one, seed=int(rng.integers(1 << 31)))

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from benchmarks.boards import render_board
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, drawn_camera
 from benchmarks.intrinsics.tables import Table
 from calib_core.intrinsics import BoardSearch, calibrate_lens, search_boards
 from calib_core.measurements import TimeNs
-from calib_core.synthetic.boards import render_board, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["speed_table"]
 

@@ -109,7 +109,7 @@ def assumptions_of(seed: int, settings: Settings) -> dict[str, float]:
 
 
 def _seen(recording: SimulatedRecording) -> tuple[RadarScans, Boxes, ReturnLabels]:
-    return RadarScans.from_scans(list(recording.scans())), true_boxes(recording), true_labels(recording)
+    return recording.scans, true_boxes(recording), true_labels(recording)
 
 
 def _shrunk(boxes: Boxes) -> Boxes:

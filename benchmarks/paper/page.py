@@ -219,7 +219,8 @@ def _with_focal_length(sets: Sequence[Sequence[Seed]], focal_px: float, settings
 
 def _board_px(settings: Settings) -> float:
     stage = session("d2", SEED_SETS[0][0], settings).stage
-    pixels = stage.rig.camera.project(stage.rig.camera_from_world @ stage.scene.board_corners_m)
+    assert stage.scene.board is not None, "D2 has a checkerboard"
+    pixels = stage.rig.camera.project(stage.rig.camera_from_world @ stage.scene.board.corners_m)
     return float(np.linalg.norm(pixels[7] - pixels[0]))
 
 

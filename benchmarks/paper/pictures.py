@@ -21,14 +21,14 @@ from benchmarks.paper.rows import (
     with_gross_errors,
 )
 from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, other_rig
+from benchmarks.proposing.pictures import SimulatedPictures
 from calib_core.arrays import Flags, Indices, Points2
 from calib_core.evaluation import BoxFigures
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Box, TimeNs
 from calib_core.results import Calibration
-from calib_core.synthetic import PresetName, SimulatedRecording, SimulatedScans, simulate, simulate_scans
+from calib_core.synthetic import PresetName, SimulatedRecording, simulate
 from calib_core.synthetic.annotations import true_boxes
-from calib_core.synthetic.recording import SimulatedPictures
 
 _STYLE = (
     "<style>text{font:15px sans-serif;fill:#222}.title{font-size:18px;font-weight:bold}.axis{stroke:#444;fill:none}"
@@ -117,17 +117,16 @@ def _figure(title: str, panels: Sequence[Panel]) -> str:
 
 
 def _on_own_rig(dataset: Dataset, seed: int, settings: Settings) -> list[Panel]:
-    recording, simulated, ppm = _solved(dataset, seed, settings)
-    other, pose = ("PMM", by_mounting(simulated)) if dataset == "d1" else ("CCM", by_checkerboard(simulated, ppm)[0])
+    recording, ppm = _solved(dataset, seed, settings)
+    other, pose = ("PMM", by_mounting(recording)) if dataset == "d1" else ("CCM", by_checkerboard(recording, ppm)[0])
     name = dataset.upper()
     return _clicked(recording, ppm, {f"(A) PPM+{name}": None, f"(B) {other}+{name}": pose})
 
 
 def _d3(seed: int, settings: Settings) -> list[Panel]:
-    recording, simulated, same = _solved("d3", seed, settings)
-    other = recording.other_camera
-    assert other is not None, "D3 has a second camera"
-    apart = with_gross_errors(other_rig(simulated), settings.gross_pairs, settings.gross_m).unwrap()
+    recording, same = _solved("d3", seed, settings)
+    other = other_rig(recording)
+    apart = with_gross_errors(other, settings.gross_pairs, settings.gross_m).unwrap()
     wrong = f"{settings.gross_pairs} radar positions wrong by {settings.gross_m:g} m"
     return [
         *_clicked(recording, same, {"(A) same rig": None}),
@@ -135,10 +134,9 @@ def _d3(seed: int, settings: Settings) -> list[Panel]:
     ]
 
 
-def _solved(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedRecording, SimulatedScans, Calibration]:
-    options = options_of(dataset, seed, settings)
-    simulated = simulate_scans(options)
-    return simulate(options), simulated, calibrated(simulated).unwrap()
+def _solved(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedRecording, Calibration]:
+    recording = simulate(options_of(dataset, seed, settings))
+    return recording, calibrated(recording).unwrap()
 
 
 def _clicked(

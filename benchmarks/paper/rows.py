@@ -14,7 +14,8 @@ from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import aed, cdsd, distances
-from calib_core.synthetic import SimulatedScans
+from calib_core.synthetic import SimulatedRecording
+from calib_core.synthetic.rig import OTHER_OFFSET_M, OTHER_YAW_DEG
 
 MOST_GROSS = 4
 
@@ -66,20 +67,20 @@ class Seed:
     gross: tuple[Gross, ...] = ()
 
 
-def calibrated(simulated: SimulatedScans) -> Calibration | Unsolvable:
+def calibrated(simulated: SimulatedRecording) -> Calibration | Unsolvable:
     """Calibrate a simulated data set by the paper's method (PPM)."""
     return calibrate(simulated.clicks, simulated.scans, simulated.camera, PPM)
 
 
-def by_mounting(simulated: SimulatedScans, *, other_rig: bool = False) -> RigidTransform:
+def by_mounting(simulated: SimulatedRecording, *, other_rig: bool = False) -> RigidTransform:
     """Return camera_from_radar by tape measure and protractor (PMM): nominal rotation and measured offset."""
-    rig, other = simulated.stage.options.rig, simulated.stage.options.other_camera
-    offset_m, yaw_deg = (other.offset_m, other.yaw_deg) if other_rig else (rig.camera_offset_m, 0.0)
+    own = simulated.options.rig.camera_offset_m, 0.0
+    offset_m, yaw_deg = (OTHER_OFFSET_M, OTHER_YAW_DEG) if other_rig else own
     rotation = mounting_rotation(0.0, 0.0, yaw_deg)
     return RigidTransform(rotation, -rotation @ np.array(offset_m))
 
 
-def by_checkerboard(simulated: SimulatedScans, on_board: Calibration) -> tuple[np.ndarray, tuple[float, float]]:
+def by_checkerboard(simulated: SimulatedRecording, on_board: Calibration) -> tuple[np.ndarray, tuple[float, float]]:
     """Return CCM's matrix (3, 4), [R | t] of P_c = [R | t] P_r (paper, equation 1), with the conditions that a seed keeps.
 
     Its twelve numbers are found by linear least squares; none says that R is a rotation. P_c is the corner of the board
@@ -152,7 +153,7 @@ def measure(seed: int, settings: Settings, datasets: Sequence[Dataset] = ("d1", 
 
 
 def with_gross_errors(
-    other: SimulatedScans, count: int, by_m: float, options: CalibrationOptions = PPM
+    other: SimulatedRecording, count: int, by_m: float, options: CalibrationOptions = PPM
 ) -> Calibration | Unsolvable:
     """Calibrate with some radar positions displaced by a fixed distance in random horizontal directions."""
     if options.method == "paper":
@@ -177,14 +178,14 @@ def _moved(pair: Pair, by_m: float, turn_rad: float) -> Pair:
     return replace(pair, candidates=candidates)
 
 
-def _gross_errors(other: SimulatedScans, settings: Settings) -> tuple[Gross, ...]:
+def _gross_errors(other: SimulatedRecording, settings: Settings) -> tuple[Gross, ...]:
     """Solve DR+D3 with 0 to 4 grossly wrong radar positions, by both methods."""
     tried = [(count, options) for options in (PPM, CalibrationOptions()) for count in range(MOST_GROSS + 1)]
     outcomes = ((count, with_gross_errors(other, count, settings.gross_m, options)) for count, options in tried)
     return tuple(_gross(one, other, count) for count, one in outcomes if isinstance(one, Calibration))
 
 
-def _gross(outcome: Calibration, other: SimulatedScans, count: int) -> Gross:
+def _gross(outcome: Calibration, other: SimulatedRecording, count: int) -> Gross:
     found, true = outcome.camera_from_radar, other.camera_from_radar
     return Gross(
         count,

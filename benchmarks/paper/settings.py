@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from calib_core.options import CalibrationOptions
-from calib_core.synthetic import PRESETS, PresetName, SimulatedScans, SimulationOptions, simulate_scans
+from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, SimulationOptions, simulate
 
 Dataset: TypeAlias = Literal["d1", "d2", "d3"]
 SEED_SETS: Sequence[Sequence[int]] = (range(401, 421), range(421, 441))
@@ -78,13 +78,13 @@ def under(options: SimulationOptions, seed: int, settings: Settings) -> Simulati
         options.defects,
         constant_azimuth_deg=share * settings.constant_azimuth_deg,
         constant_elevation_deg=share * settings.constant_elevation_deg,
+        azimuth_bins=0,
     )
     return replace(
         options,
         seed=seed,
         defects=defects,
         rig=replace(options.rig, camera_angle_sigma_deg=settings.mounting_error_deg),
-        angle_bins=False,
         camera_model="plumb_bob" if settings.distortion else "pinhole",
         width_px=settings.width_px,
         height_px=settings.width_px * 9 // 16,
@@ -92,12 +92,12 @@ def under(options: SimulationOptions, seed: int, settings: Settings) -> Simulati
     )
 
 
-def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedScans:
+def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedRecording:
     """Simulate scans and clicks of a data set."""
-    return simulate_scans(options_of(dataset, seed, settings))
+    return simulate(options_of(dataset, seed, settings))
 
 
-def other_rig(d3: SimulatedScans) -> SimulatedScans:
+def other_rig(d3: SimulatedRecording) -> SimulatedRecording:
     """Return DR+D3: the same scans with the clicks in the second camera's pictures."""
     assert d3.other_camera is not None, "D3 has a second camera"
     return d3.other_camera

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.proposing.cases import Case
-from benchmarks.proposing.pictures import ChangingLight, KeptPictures
+from benchmarks.proposing.pictures import ChangingLight, KeptPictures, SimulatedPictures
 from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import FrameSource
-from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 __all__ = ["Drawn", "draw", "drawn_from", "true_placement"]
@@ -66,7 +66,7 @@ def _scans(recording: SimulatedRecording, path: Path | None) -> RadarScans:
     if path is not None and path.is_file():
         with np.load(path, allow_pickle=False) as kept:
             return RadarScans(**{name: kept[name] for name in _COLUMNS})
-    scans = RadarScans.from_scans(list(recording.scans()))
+    scans = recording.scans
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(path, **{name: getattr(scans, name) for name in _COLUMNS})

@@ -17,7 +17,7 @@ from calib_core.errors import OptionError
 from calib_core.proposing import DwellView, Proposal, Proposals, dwell_views
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import Facet, subdivided
-from calib_core.synthetic.scene.story import Moment
+from calib_core.synthetic.scene.person import Capsule
 
 __all__ = ["LOOKS", "draw_with_look"]
 
@@ -74,10 +74,12 @@ class _Renderer(FrameRenderer):
 
     facets: Facets = _board
 
-    def _draw_reflector(self, levels: np.ndarray, moment: Moment) -> None:
-        apex_m = moment.reflector_m
-        facets = self.facets(apex_m, moment.facing_rad)
-        self._draw_facets(levels, facets, float(np.linalg.norm(apex_m - self.still.eye_m)))
+    def reflector(
+        self, apex_m: Vector3, facing_rad: float, *, at_rest: bool, rests_at_m: float
+    ) -> tuple[tuple[Capsule, ...], list[Facet]]:
+        """Return the stand of a reflector and its facets."""
+        stand, _ = FrameRenderer.reflector(self, apex_m, facing_rad, at_rest=at_rest, rests_at_m=rests_at_m)
+        return stand, self.facets(apex_m, facing_rad)
 
 
 def draw_with_look(seed: int, look: str) -> Drawn:

@@ -1,6 +1,5 @@
 """One recording measured: what is proposed without a click, and the pose that follows from it."""
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -9,13 +8,15 @@ import cv2
 from benchmarks.accuracy.rows import Figures
 from benchmarks.proposing.cases import case_of
 from benchmarks.proposing.clicking import Clicked, after_one_click
-from benchmarks.proposing.drawn import Drawn, draw
+from benchmarks.proposing.drawn import Drawn, draw, drawn_from
 from benchmarks.proposing.left_alone import automatic_figures
 from benchmarks.proposing.pixels import placement_figures, proposal_figures
 from benchmarks.proposing.solving import accepted_clicks, pose_figures
+from benchmarks.proposing.square_reflector import with_square_reflectors
 from calib_core.errors import OptionError
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import dwell_views, proposals_of
+from calib_core.synthetic import simulate
 
 __all__ = ["measure_case", "measure_drawn", "measure_square"]
 
@@ -44,7 +45,7 @@ def measure_square(folder: Path, seed: int) -> Figures:
     """
     cv2.setNumThreads(1)
     case = case_of(seed)
-    return measure_drawn(draw(replace(case, options=replace(case.options, reflector_design="square")), folder))
+    return measure_drawn(drawn_from(with_square_reflectors(simulate(case.options)), case, folder))
 
 
 def measure_drawn(drawn: Drawn) -> Figures:

@@ -1,4 +1,4 @@
-"""Camera frames of simulated recordings: rendered once and kept as JPEG, and under light that changes."""
+"""Camera frames of simulated recordings: rendered on request, once and kept as JPEG, and under light that changes."""
 
 import os
 from dataclasses import dataclass
@@ -10,14 +10,33 @@ import numpy as np
 from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
 from calib_core.proposing import FrameSource
+from calib_core.synthetic.recording import SimulatedRecording
+from calib_core.synthetic.rendering.frames import FrameRenderer
+from calib_core.synthetic.scene.stage import child_rng
 
-__all__ = ["ChangingLight", "KeptPictures"]
+__all__ = ["ChangingLight", "KeptPictures", "SimulatedPictures"]
 
 _JPEG_QUALITY = 90
 _PERIODS_S = (25.0, 90.0)
 _BRIGHTER = 0.22
 _COLOURED = 0.04
 _STEP = (0.75, 1.3)
+
+
+class SimulatedPictures:
+    """Renders any frame; its camera noise is a draw of its own, so pixels differ from those of `frames()` by noise."""
+
+    def __init__(self, recording: SimulatedRecording, renderer: FrameRenderer | None = None) -> None:
+        self._recording, self._renderer = recording, renderer
+        self.image_times: TimesNs = recording.stage.frame_times.header_ns
+
+    def image(self, index: int, /) -> np.ndarray:
+        """Render a frame, compressed as JPEG and decoded again: uint8 (h, w, 3), blue first."""
+        rng = np.random.default_rng([int(child_rng(self._recording.options, 11).integers(2**31)), index])
+        pixels = self._recording.picture(index, rng, self._renderer)
+        good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        assert good, "OpenCV encodes every 8-bit picture"
+        return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ import numpy as np
 
 from benchmarks.proposing.cases import Case, case_of
 from benchmarks.proposing.drawn import Drawn, drawn_from
+from benchmarks.proposing.pictures import SimulatedPictures
 from calib_core.arrays import TimesNs
 from calib_core.proposing import FrameSource
-from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.still import Still, pixel_rays
-from calib_core.synthetic.rendering.surfaces import sun_direction
 
 __all__ = ["draw_small", "small_case"]
 
@@ -72,5 +72,4 @@ def _rendered_by(renderer: Callable[..., FrameRenderer], recording: SimulatedRec
         pixel_rays(rig),
         rig.camera_position_world_m,
     )
-    scene = recording.stage.scene
-    return renderer(scene, rig, still, sun_direction(scene), options.surroundings, options.reflector_edge_m)
+    return renderer(recording.stage.scene, rig, still)

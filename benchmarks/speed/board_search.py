@@ -5,11 +5,12 @@ import time
 import cv2
 import numpy as np
 
+from benchmarks.boards import BoardFilm, render_board
 from benchmarks.speed.rows import Row, Table
 from calib_core.intrinsics import Board, search_boards
 from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import BoardFilm, render_board, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["measure_board_search"]
 

@@ -12,7 +12,6 @@ from benchmarks.targets.cases import CASES
 from calib_core.errors import InputError, OptionError
 from calib_core.evaluation import CountedReturns, counted_returns, judged_by_boxes, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import RadarScans
 from calib_core.synthetic import SimulationOptions, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
 
@@ -72,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _measure(options: SimulationOptions) -> _Draw:
     recording = simulate(options)
-    scans, boxes, camera = RadarScans.from_scans(list(recording.scans())), true_boxes(recording), recording.camera
+    scans, boxes, camera = recording.scans, true_boxes(recording), recording.camera
     truth = counted_returns(camera, scans, boxes, true_labels(recording))
     own = counted_returns(camera, scans, boxes, moving_targets(scans))
     pose = recording.camera_from_radar

@@ -7,7 +7,7 @@ from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, Return
 from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rendering.surfaces import Solid, block
 from calib_core.synthetic.scans import labelled_scans
-from calib_core.synthetic.scene.person import PersonState, capsules
+from calib_core.synthetic.scene.person import PersonState, body_hides, capsules
 from calib_core.synthetic.scene.stage import Stage
 from calib_core.synthetic.scene.traffic import Actor, VehicleState, hidden_by, outline_points
 
@@ -107,24 +107,13 @@ def _hidden(
     """Return which points (n, 3) other objects or the scene's solids hide from an eye."""
     hidden = np.zeros(len(points_m), dtype=np.bool_)
     for other in others:
-        hidden |= (
-            hidden_by(other, eye_m, points_m) if isinstance(other, VehicleState) else _behind(other, eye_m, points_m)
-        )
+        if isinstance(other, VehicleState):
+            hidden |= hidden_by(other, eye_m, points_m)
+        else:
+            hidden |= body_hides(other, eye_m, points_m, half_width_m=_SHOULDER_M, clearance_m=0.4, height_m=_HEAD_M)
     way = points_m - eye_m
     distance = np.linalg.norm(way, axis=1)
     origin, rays = eye_m.astype(np.float32), (way / distance[:, None]).astype(np.float32)
     for solid in solids:
         hidden |= solid.crossing(origin, rays)[0] < distance - 0.05
     return hidden
-
-
-def _behind(person: PersonState, eye_m: Vector3, points_m: Points3) -> np.ndarray:
-    """Return which points a person hides: an upright body as wide as the shoulders."""
-    way = points_m - eye_m
-    reach = np.maximum(np.linalg.norm(way[:, :2], axis=1), 1e-9)
-    along = way[:, :2] / reach[:, None]
-    to_person = person.place_m - eye_m[:2]
-    depth = along @ to_person
-    aside = np.abs(along[:, 0] * to_person[1] - along[:, 1] * to_person[0])
-    height = eye_m[2] + way[:, 2] * depth / reach
-    return np.asarray((aside < _SHOULDER_M) & (depth > 0.0) & (depth < reach - 0.4) & (height < _HEAD_M))

@@ -1,42 +1,22 @@
-"""Calibration boards with known truth: as they really are, moving, in pictures, and as corners without pictures.
+"""A calibration board in the picture: as it really is, moving, and at the poses of one that a person waves before a camera.
 
-A printed board is bent, and its squares are not equal; a moving one is exposed row by row. In a picture every pixel goes through
-the lens to the board, smooth at its edges, with a cluttered room behind it. `simulated_views` gives corners in many pictures,
-without the pictures, for Monte Carlo, at poses of a board that a person waves before a camera, or holds badly.
+A printed board may be bent, and a moving one is exposed row by row. Every pixel goes through the lens to the board, smooth at
+its edges.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.intrinsics import Board, BoardCorners
+from calib_core.intrinsics import Board
+from calib_core.synthetic.rendering.still import Window
 
-
-@dataclass(frozen=True, slots=True)
-class BoardShape:
-    """How a board differs from the ideal one; the same in every picture.
-
-    Attributes:
-        bend_m: how far its middle stands behind its sides, and behind its upper and lower edge: a quadratic bend [m].
-        scale: size of the squares along x and y over the stated one.
-        unequal_m: standard deviation of where each line between squares is printed [m].
-        seed: of these lines.
-    """
-
-    bend_m: tuple[float, float] = (0.0, 0.0)
-    scale: tuple[float, float] = (1.0, 1.0)
-    unequal_m: float = 0.0
-    seed: int = 0
-
-
-_MARGIN_SQUARES = 0.6
+MARGIN_SQUARES = 0.6
 """Width of the white margin around the squares."""
-_TAG_BORDER_BITS = 2
-"""Kalibr's; the width of a tag's black border."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,81 +39,16 @@ class BoardPattern:
         shape = (len(self.y_m) - 1, len(self.x_m) - 1)
         object.__setattr__(self, "paper", frozen_array(self.paper, shape, dtype=np.float32))
 
-    @property
-    def size_m(self) -> tuple[float, float]:
-        """Width and height with the margin [m]."""
-        return float(np.ptp(self.x_m)), float(np.ptp(self.y_m))
 
-
-def pattern_of(board: Board) -> BoardPattern:
-    """Return what is printed on a board."""
-    match board.kind:
-        case "checkerboard":
-            return _checkerboard(board)
-        case "charuco":
-            return _charuco(board)
-        case _:
-            return _aprilgrid(board)
-
-
-def _checkerboard(board: Board) -> BoardPattern:
+def checkerboard(board: Board) -> BoardPattern:
+    """Return the squares of a checkerboard."""
     x_m, y_m = (board.square_m * np.arange(-1, count + 1) for count in (board.columns, board.rows))
     odd = np.add.outer(np.arange(board.rows + 1), np.arange(board.columns + 1)) % 2
-    return _with_margin(x_m, y_m, odd, _MARGIN_SQUARES * board.square_m)
+    return with_margin(x_m, y_m, odd, MARGIN_SQUARES * board.square_m)
 
 
-def _charuco(board: Board) -> BoardPattern:
-    """Lay out a ChArUco board as OpenCV does: the upper left square is black, markers are in the white ones."""
-    import cv2
-
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-    bits = dictionary.markerSize + 2
-    inset = 0.5 * (board.square_m - board.marker_m)
-    steps = np.concatenate([[0.0], inset + board.marker_m * np.arange(bits + 1) / bits])
-    x_m, y_m = (
-        np.append((board.square_m * np.arange(-1, count - 1)[:, None] + steps).ravel(), board.square_m * (count - 1))
-        for count in (board.columns, board.rows)
-    )
-    paper = np.zeros((len(y_m) - 1, len(x_m) - 1))
-    number = 0
-    for row in range(board.rows):
-        for column in range(board.columns):
-            if (row + column) % 2 == 0:
-                continue
-            square = paper[row * len(steps) : (row + 1) * len(steps), column * len(steps) : (column + 1) * len(steps)]
-            square[:] = 1.0
-            square[1:-1, 1:-1] = dictionary.generateImageMarker(number, bits, borderBits=1) > 0
-            number += 1
-    return _with_margin(x_m, y_m, paper, _MARGIN_SQUARES * board.square_m)
-
-
-def _aprilgrid(board: Board) -> BoardPattern:
-    """Lay out a grid of AprilTags as Kalibr prints it: tag 0 below left, black squares at the corners of all tags."""
-    import cv2
-
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    bits = dictionary.markerSize + 2 * _TAG_BORDER_BITS
-    first_m = board.corners_m[:, :2].min(axis=0)
-    steps = board.square_m * np.arange(bits + 1) / bits
-    pitch_m = board.square_m + board.marker_m
-    x_m, y_m = (
-        np.concatenate([[-board.marker_m], (pitch_m * np.arange(count)[:, None] + steps).ravel(), [pitch_m * count]])
-        for count in (board.columns, board.rows)
-    )
-    paper = np.ones((len(y_m) - 1, len(x_m) - 1))
-    paper[:: bits + 1, :: bits + 1] = 0.0
-    for tag in range(board.columns * board.rows):
-        row, column = board.rows - 1 - tag // board.columns, tag % board.columns
-        cells = (
-            slice(row * (bits + 1) + 1, (row + 1) * (bits + 1)),
-            slice(column * (bits + 1) + 1, (column + 1) * (bits + 1)),
-        )
-        upside_down = dictionary.generateImageMarker(tag, bits, borderBits=_TAG_BORDER_BITS) > 0
-        paper[cells] = upside_down[::-1, ::-1]  # OpenCV's tags are AprilTag's, turned by half a turn
-    return _with_margin(first_m[0] + x_m, first_m[1] + y_m, paper, 0.3 * board.square_m)
-
-
-def _with_margin(x_m: Values, y_m: Values, paper: np.ndarray, margin_m: float) -> BoardPattern:
+def with_margin(x_m: Values, y_m: Values, paper: np.ndarray, margin_m: float) -> BoardPattern:
+    """Return the cells between lines, with white paper around them."""
     around = [np.concatenate([[lines[0] - margin_m], lines, [lines[-1] + margin_m]]) for lines in (x_m, y_m)]
     return BoardPattern(around[0], around[1], np.pad(paper, 1, constant_values=1.0))
 
@@ -166,60 +81,39 @@ class PrintedBoard:
         return np.asarray(self.sag_m - self.bends[0] * x * x - self.bends[1] * y * y)
 
 
-def printed_board(board: Board, shape: BoardShape) -> PrintedBoard:
-    """Return a board with its faults."""
-    ideal = pattern_of(board)
+def printed_board(board: Board, pattern: BoardPattern, bend_m: tuple[float, float] = (0.0, 0.0)) -> PrintedBoard:
+    """Return a board with its bend.
+
+    Args:
+        board: as stated.
+        pattern: what is printed on it.
+        bend_m: how far its middle stands behind its sides, and behind its upper and lower edge: a quadratic bend [m].
+    """
     corners = board.corners_m
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     half = 0.5 * np.ptp(corners[:, :2], axis=0)
-    rng = np.random.default_rng([shape.seed, 77])
-    lines = []
-    for axis, ideal_m in enumerate((ideal.x_m, ideal.y_m)):
-        scaled = middle[axis] + shape.scale[axis] * (ideal_m - middle[axis])
-        lines.append(scaled + shape.unequal_m * rng.standard_normal(len(ideal_m)))
-    bends = (float(shape.bend_m[0] / half[0] ** 2), float(shape.bend_m[1] / half[1] ** 2))
-    made = PrintedBoard(
-        BoardPattern(lines[0], lines[1], ideal.paper), np.zeros((0, 3)), middle, bends, float(sum(shape.bend_m))
-    )
-    x, y = np.interp(corners[:, 0], ideal.x_m, lines[0]), np.interp(corners[:, 1], ideal.y_m, lines[1])
-    true = np.stack([x, y, made.height_m(x, y)], axis=1)
-    return PrintedBoard(made.pattern, true, middle, bends, made.sag_m)
+    x_m, y_m = (middle[i] + (lines_m - middle[i]) for i, lines_m in enumerate((pattern.x_m, pattern.y_m)))
+    bends = (float(bend_m[0] / half[0] ** 2), float(bend_m[1] / half[1] ** 2))
+    flat = PrintedBoard(BoardPattern(x_m, y_m, pattern.paper), np.zeros((0, 3)), middle, bends, float(sum(bend_m)))
+    x, y = np.interp(corners[:, 0], pattern.x_m, x_m), np.interp(corners[:, 1], pattern.y_m, y_m)
+    return replace(flat, corners_m=np.stack([x, y, flat.height_m(x, y)], axis=1))
 
 
 @dataclass(frozen=True, slots=True)
-class BoardFilm:
-    """How a board is filmed.
+class BoardMotion:
+    """How a board moves while it is filmed.
 
     Attributes:
-        shape: of the board.
-        blur_px: standard deviation of the lens blur [px].
-        noise_grey: standard deviation of the sensor's noise [grey levels], the same in all three channels.
-        exposure: brightness over the usual one.
-        gradient: by how much brighter than in the middle the light is at the right and at the lower border, as a share.
-        vignetting: share of the light that is missing in the corners.
-        black_grey, white_grey: levels of the board's ink and paper.
         velocity_mps: (3,) of the board's middle, in the camera frame.
         turning_radps: (3,) the board's rotation vector per second, in the camera frame.
         rolling_shutter_s: from the exposure of the first row to that of the last; the pose is that at the middle row.
         exposure_s: how long each row is exposed.
     """
 
-    shape: BoardShape = field(default_factory=BoardShape)
-    blur_px: float = 0.0
-    noise_grey: float = 0.0
-    exposure: float = 1.0
-    gradient: tuple[float, float] = (0.0, 0.0)
-    vignetting: float = 0.0
-    black_grey: float = 35.0
-    white_grey: float = 205.0
     velocity_mps: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turning_radps: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rolling_shutter_s: float = 0.0
     exposure_s: float = 0.0
-
-
-_ROUNDS = 30
-_CLOSE_PX = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,108 +124,46 @@ class MovingBoard:
         printed: the board.
         camera: that films it.
         camera_from_board: its pose when the middle row is exposed.
-        film: how it moves, and how the rows are exposed.
+        motion: how it moves, and how the rows are exposed.
     """
 
     printed: PrintedBoard
     camera: Camera
     camera_from_board: RigidTransform
-    film: BoardFilm
+    motion: BoardMotion
 
     @property
     def rows_differ(self) -> bool:
         """Whether the board is elsewhere in each row."""
-        return bool(self.film.rolling_shutter_s and self.moves)
+        return bool(self.motion.rolling_shutter_s and self.moves)
 
     @property
     def moves(self) -> bool:
         """Whether the board moves at all."""
-        return any(self.film.velocity_mps) or any(self.film.turning_radps)
+        return any(self.motion.velocity_mps) or any(self.motion.turning_radps)
 
     def row_times_s(self, rows_px: Values) -> Values:
         """Return when rows are exposed, from the time of the pose on [s]."""
         height = self.camera.height_px
-        return np.asarray(self.film.rolling_shutter_s * (rows_px - 0.5 * (height - 1)) / height)
+        return np.asarray(self.motion.rolling_shutter_s * (rows_px - 0.5 * (height - 1)) / height)
 
     def poses(self, times_s: Values) -> tuple[np.ndarray, np.ndarray]:
         """Return rotations (n, 3, 3) and translations (n, 3) of camera_from_board at times (n,)."""
         times = np.asarray(times_s, dtype=np.float64)[:, None]
         middle = self.camera_from_board @ self.printed.middle_m[None]
-        rotations = rotation_exp(times * np.array(self.film.turning_radps)) @ self.camera_from_board.rotation
-        middles = middle + times * np.array(self.film.velocity_mps)
+        rotations = rotation_exp(times * np.array(self.motion.turning_radps)) @ self.camera_from_board.rotation
+        middles = middle + times * np.array(self.motion.velocity_mps)
         return rotations, middles - rotations @ self.printed.middle_m
 
-    def pixels(self, points_m: Points3) -> Points2:
-        """Return where points of the board (n, 3) are in the picture: each in the row that is exposed when it is there."""
-        pixels = self.camera.project(self.camera_from_board @ points_m)
-        if not self.rows_differ:
-            return pixels
-        for _ in range(_ROUNDS):
-            rotations, translations = self.poses(self.row_times_s(pixels[:, 1]))
-            seen: Vector3 = np.einsum("nij,nj->ni", rotations, points_m) + translations
-            before, pixels = pixels, self.camera.project(seen)
-            if not np.nanmax(np.abs(pixels - before), initial=0.0) > _CLOSE_PX:
-                break
-        return pixels
 
-
-def true_corners(
-    board: Board, camera: Camera, camera_from_board: RigidTransform, film: BoardFilm | None = None
-) -> Points2:
-    """Return where the corners of a filmed board really are (n, 2), by id; NaN behind the camera. For tests only.
-
-    Args:
-        board: the board as stated.
-        camera: the true camera.
-        camera_from_board: the board's pose when the middle row is exposed.
-        film: how it is filmed; None for an ideal board at rest.
-    """
-    film = film or BoardFilm()
-    printed = printed_board(board, film.shape)
-    return MovingBoard(printed, camera, camera_from_board, film).pixels(printed.corners_m)
-
-
+_BLACK_GREY, _WHITE_GREY = 35.0, 205.0
+"""Of the board's ink and paper."""
 _FINE = 2
 """Samples per pixel along each axis; each is filtered over its own width, so that edges are exact."""
 _STRIDE = 8
 _LOOKUP = 4096
 _MOST_EXPOSURES = 15
 _MARGIN_PX = 4.0
-
-
-def render_board(
-    board: Board,
-    camera: Camera,
-    camera_from_board: RigidTransform,
-    film: BoardFilm | None = None,
-    *,
-    seed: int = 0,
-    background: np.ndarray | None = None,
-) -> np.ndarray:
-    """Render a board: (h, w, 3) uint8, blue first, all channels alike.
-
-    Args:
-        board: which board.
-        camera: the lens.
-        camera_from_board: the board's pose when the middle row is exposed.
-        film: what the picture suffers; None for an ideal one.
-        seed: of the background and the noise.
-        background: (h, w) grey levels behind the board; None draws a cluttered room.
-    """
-    import cv2
-
-    film = film or BoardFilm()
-    rng = np.random.default_rng([seed, 5])
-    levels = room_behind(rng, camera) if background is None else background.astype(np.float32)
-    moving = MovingBoard(printed_board(board, film.shape), camera, camera_from_board, film)
-    draw_board(levels, moving)
-    if film.blur_px:
-        levels = cv2.GaussianBlur(levels, (0, 0), film.blur_px, borderType=cv2.BORDER_REPLICATE)
-    levels *= _light(camera, film)
-    if film.noise_grey:
-        levels += film.noise_grey * rng.standard_normal(levels.shape, dtype=np.float32)
-    grey = np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8)
-    return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR))
 
 
 def draw_board(levels: np.ndarray, moving: MovingBoard, *, blur_px: float = 0.0) -> None:
@@ -347,16 +179,15 @@ def draw_board(levels: np.ndarray, moving: MovingBoard, *, blur_px: float = 0.0)
     window = _window(moving)
     if window is None:
         return
-    rows, columns = window
-    film = moving.film
+    rows, columns, exposure_s = window.rows, window.columns, moving.motion.exposure_s
     shares = _exposures(moving)
     u, v = (one.start - 0.5 + (np.arange(_FINE * (one.stop - one.start)) + 0.5) / _FINE for one in (columns, rows))
     rays = grid_rays(moving.camera, u, v).astype(np.float32)  # good for 1e-4 px, and twice as fast
-    drawn = [_sampled(moving, _on_board(moving, rays, v, share * film.exposure_s)) for share in shares.tolist()]
+    drawn = [_sampled(moving, _on_board(moving, rays, v, share * exposure_s)) for share in shares.tolist()]
     paper, cover = np.mean([white for white, _ in drawn], axis=0), np.mean([whole for _, whole in drawn], axis=0)
     if blur_px:
         paper, cover = (cv2.GaussianBlur(layer, (0, 0), blur_px) for layer in (paper, cover))
-    board = np.float32(film.black_grey) * (cover - paper) + np.float32(film.white_grey) * paper
+    board = np.float32(_BLACK_GREY) * (cover - paper) + np.float32(_WHITE_GREY) * paper
     patch = levels[rows, columns]
     if levels.ndim == 3:
         board, cover = board[..., None], cover[..., None]
@@ -366,9 +197,9 @@ def draw_board(levels: np.ndarray, moving: MovingBoard, *, blur_px: float = 0.0)
 
 def _exposures(moving: MovingBoard) -> Values:
     """Return the times within the exposure at which the board is drawn, as shares of it about its middle."""
-    if not (moving.film.exposure_s and moving.moves):
+    if not (moving.motion.exposure_s and moving.moves):
         return np.zeros(1)
-    half = 0.5 * moving.film.exposure_s
+    half = 0.5 * moving.motion.exposure_s
     rotations, translations = moving.poses(np.array([-half, half]))
     corners = moving.printed.corners_m
     ends = [
@@ -379,24 +210,16 @@ def _exposures(moving: MovingBoard) -> Values:
     return (np.arange(count) + 0.5) / count - 0.5
 
 
-def _window(moving: MovingBoard) -> tuple[slice, slice] | None:
-    """Return the rows and columns of the picture in which the board is; None if it is not in it."""
+def _window(moving: MovingBoard) -> Window | None:
+    """Return the part of the picture in which the board is; None if it is not in it."""
     pattern, camera = moving.printed.pattern, moving.camera
-    x, y = np.meshgrid(
-        np.linspace(pattern.x_m[0], pattern.x_m[-1], 24), np.linspace(pattern.y_m[0], pattern.y_m[-1], 24)
-    )
+    x, y = np.meshgrid(*(np.linspace(lines_m[0], lines_m[-1], 24) for lines_m in (pattern.x_m, pattern.y_m)))
     points = np.stack([x, y, moving.printed.height_m(x, y)], axis=-1).reshape(-1, 3)
-    reach_s = 0.5 * (moving.film.rolling_shutter_s + moving.film.exposure_s)
+    reach_s = 0.5 * (moving.motion.rolling_shutter_s + moving.motion.exposure_s)
     poses = moving.poses(np.array([-reach_s, 0.0, reach_s]))
     pixels = np.concatenate([camera.project(points @ turn.T + shift) for turn, shift in zip(*poses, strict=True)])
     pixels = pixels[np.isfinite(pixels).all(axis=1)]
-    if not len(pixels):
-        return None
-    low = np.maximum(np.floor(pixels.min(axis=0) - _MARGIN_PX), 0).astype(int)
-    high = np.minimum(np.ceil(pixels.max(axis=0) + _MARGIN_PX + 1), [camera.width_px, camera.height_px]).astype(int)
-    if np.any(high <= low):
-        return None
-    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
+    return Window.around(pixels, camera, _MARGIN_PX) if len(pixels) else None
 
 
 def _sampled(moving: MovingBoard, places_m: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -481,37 +304,6 @@ def _width(places: np.ndarray) -> np.ndarray:
     return np.maximum(cv2.resize(wide, places.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32(1e-7))
 
 
-def _light(camera: Camera, film: BoardFilm) -> np.ndarray:
-    """Return the brightness (h, w) over the usual one: exposure, gradient, vignetting."""
-    u = np.linspace(-1.0, 1.0, camera.width_px, dtype=np.float32)
-    v = np.linspace(-1.0, 1.0, camera.height_px, dtype=np.float32)[:, None]
-    corner = u[0] ** 2 + v[0] ** 2
-    slope = 1.0 + np.float32(film.gradient[0]) * u + np.float32(film.gradient[1]) * v
-    dark = 1.0 - np.float32(film.vignetting) * (u * u + v * v) / corner
-    return np.asarray(np.float32(film.exposure) * np.maximum(slope, 0.0) * dark, dtype=np.float32)
-
-
-_OCTAVES_PX = ((160, 28.0), (40, 14.0), (9, 6.0))
-_THINGS = 14
-
-
-def room_behind(rng: np.random.Generator, camera: Camera) -> np.ndarray:
-    """Draw grey levels (h, w), float32: clouds of three sizes, and things with straight edges."""
-    import cv2
-
-    width, height = camera.width_px, camera.height_px
-    levels = np.full((height, width), 110.0, dtype=np.float32)
-    for size, strength in _OCTAVES_PX:
-        small = rng.standard_normal((height // size + 3, width // size + 3), dtype=np.float32)
-        levels += np.float32(strength) * cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
-    for _ in range(_THINGS):
-        u, v = rng.uniform([0.0, 0.0], [width, height]).tolist()
-        long, wide = (rng.uniform(0.02, 0.22, 2) * width).tolist()
-        corners = cv2.boxPoints(((u, v), (long, wide), float(rng.uniform(0.0, 180.0))))
-        cv2.fillConvexPoly(levels, np.round(corners).astype(np.int32), (float(rng.uniform(30.0, 210.0)),))
-    return np.clip(levels, 5.0, 245.0)
-
-
 _NODES = 20
 
 
@@ -547,79 +339,6 @@ def _weights(places: Values, span: tuple[float, float]) -> np.ndarray:
     return np.asarray(np.polynomial.chebyshev.chebvander(scaled, _NODES - 1) @ fit.T / _NODES)
 
 
-@dataclass(frozen=True, slots=True)
-class CornerErrors:
-    """How found corners differ from the true ones.
-
-    Attributes:
-        sigma_px: standard deviation of independent errors, per axis.
-        shared_px: standard deviation of errors that neighbouring corners of a view share, per axis.
-        shared_over: distance over which they do, as a share of the board's diagonal in the picture.
-        outlier_share: share of the corners with a gross error.
-        outlier_px: standard deviation of that, per axis.
-        speed_mps, turning_radps: standard deviations of the board's motion per axis, which matters to a rolling shutter.
-    """
-
-    sigma_px: float = 0.1
-    shared_px: float = 0.0
-    shared_over: float = 0.3
-    outlier_share: float = 0.0
-    outlier_px: float = 10.0
-    speed_mps: float = 0.0
-    turning_radps: float = 0.0
-
-
-def simulated_views(
-    rng: np.random.Generator,
-    board: Board,
-    camera: Camera,
-    poses: Sequence[RigidTransform],
-    errors: CornerErrors | None = None,
-    film: BoardFilm | None = None,
-) -> tuple[BoardCorners, ...]:
-    """Return what a detector would find in pictures of a board; corners outside the picture are missing.
-
-    Args:
-        rng: the only source of randomness.
-        board: the board as stated.
-        camera: the true camera.
-        poses: of the board, camera_from_board.
-        errors: of the corners; None for independent ones only.
-        film: its shape, and how long the picture's rows take.
-    """
-    errors, film = errors or CornerErrors(), film or BoardFilm()
-    printed = printed_board(board, film.shape)
-    size_px = camera.width_px, camera.height_px
-    views = []
-    for index, pose in enumerate(poses):
-        moving = _waved(rng, film, errors) if errors.speed_mps or errors.turning_radps else film
-        pixels = MovingBoard(printed, camera, pose, moving).pixels(printed.corners_m)
-        pixels = pixels + _drawn_errors(rng, pixels, errors)
-        ids = np.flatnonzero(camera.in_image(pixels))
-        views.append(BoardCorners(index, f"view {index + 1}", None, size_px, ids, pixels[ids]))
-    return tuple(views)
-
-
-def _waved(rng: np.random.Generator, film: BoardFilm, errors: CornerErrors) -> BoardFilm:
-    """Return the film with a drawn motion of the board."""
-    x_mps, y_mps, z_mps = (errors.speed_mps * rng.standard_normal(3)).tolist()
-    x_radps, y_radps, z_radps = (errors.turning_radps * rng.standard_normal(3)).tolist()
-    return replace(film, velocity_mps=(x_mps, y_mps, z_mps), turning_radps=(x_radps, y_radps, z_radps))
-
-
-def _drawn_errors(rng: np.random.Generator, pixels: Points2, errors: CornerErrors) -> Points2:
-    drawn = errors.sigma_px * rng.standard_normal(pixels.shape)
-    if errors.shared_px:
-        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2)
-        reach = errors.shared_over * float(np.linalg.norm(np.ptp(pixels, axis=0)))
-        values, vectors = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
-        mixed = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn += errors.shared_px * mixed @ rng.standard_normal(pixels.shape)
-    gross = rng.uniform(size=len(pixels)) < errors.outlier_share
-    drawn[gross] += errors.outlier_px * rng.standard_normal((int(gross.sum()), 2))
-    return drawn
-
-
 _TRIES = 300
 _SHIFTS = 12
 _RIM_PX = 4.0
@@ -627,26 +346,13 @@ _RIM_SQUARES = 1.2
 """Besides the corners, the squares around them are in the picture, and some of the margin."""
 
 
-@dataclass(frozen=True, slots=True)
-class Waving:
-    """How a person waves a board.
-
-    Attributes:
-        tilt_deg: largest tilt out of the picture's plane.
-        roll_deg: largest turn within it.
-        size: smallest and largest width of the board, as shares of the picture's width.
-        cover: share of the picture, around its middle, in which the board is held.
-    """
-
-    tilt_deg: float = 45.0
-    roll_deg: float = 25.0
-    size: tuple[float, float] = (0.28, 0.65)
-    cover: float = 1.0
+_TILT_RAD, _ROLL_RAD = np.deg2rad([45.0, 25.0])
+"""Largest tilt out of the picture's plane, and turn within it."""
+_SIZE = (0.28, 0.65)
+"""Smallest and largest width of the board, as shares of the picture's width."""
 
 
-def waved_poses(
-    rng: np.random.Generator, board: Board, camera: Camera, count: int, waving: Waving | None = None
-) -> tuple[RigidTransform, ...]:
+def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: int) -> tuple[RigidTransform, ...]:
     """Draw poses at which all squares are in the picture: tilted to all sides, near and far, all over it.
 
     Args:
@@ -654,12 +360,10 @@ def waved_poses(
         board: which board.
         camera: that sees it.
         count: number of poses.
-        waving: how it is held; None for all over the picture.
 
     Raises:
-        ValueError: the board does not fit in the picture in this way.
+        OptionError: the board does not fit in the picture in this way.
     """
-    waving = waving or Waving()
     corners = board.corners_m
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     outline = middle + (corners - middle) * (
@@ -667,10 +371,12 @@ def waved_poses(
     )
     found: list[RigidTransform] = []
     for place in _spread(rng, count):
-        drawn = (_drawn(rng, outline, middle, camera, waving, place) for _ in range(_TRIES))
+        drawn = (_drawn(rng, outline, middle, camera, place) for _ in range(_TRIES))
         pose = next((pose for pose in drawn if pose is not None), None)
         if pose is None:
-            raise ValueError(f"only {len(found)} of {count} poses of the board fit in the picture")
+            raise OptionError(
+                f"only {len(found)} of {count} poses of the waved board fit in the picture; ask for a usual size of pictures"
+            )
         found.append(pose)
     return tuple(found)
 
@@ -683,19 +389,17 @@ def _spread(rng: np.random.Generator, count: int) -> Points2:
 
 
 def _drawn(
-    rng: np.random.Generator, outline: Points3, middle: np.ndarray, camera: Camera, waving: Waving, place: Vector2
+    rng: np.random.Generator, outline: Points3, middle: np.ndarray, camera: Camera, place: Vector2
 ) -> RigidTransform | None:
     """Draw a tilt and a size, and shift the board into the region; None if it does not fit there."""
-    bearing, tilt = rng.uniform(0.0, 2.0 * np.pi), np.deg2rad(waving.tilt_deg) * np.sqrt(rng.uniform())
-    roll = np.deg2rad(waving.roll_deg) * rng.uniform(-1.0, 1.0)
+    bearing, tilt = rng.uniform(0.0, 2.0 * np.pi), _TILT_RAD * np.sqrt(rng.uniform())
+    roll = _ROLL_RAD * rng.uniform(-1.0, 1.0)
     turned = rotation_exp(tilt * np.array([np.cos(bearing), np.sin(bearing), 0.0])) @ rotation_exp(
         np.array([0.0, 0.0, roll])
     )
-    size_px = np.array([camera.width_px, camera.height_px])
-    inset = 0.5 * (1.0 - np.sqrt(waving.cover)) * size_px
-    low, high = inset + _RIM_PX, size_px - 1 - inset - _RIM_PX
+    low, high = _RIM_PX, np.array([camera.width_px, camera.height_px]) - 1 - _RIM_PX
     centre = low + place * (high - low)
-    distance = float(np.ptp(outline[:, 0]) * camera.matrix_px[0, 0] / (rng.uniform(*waving.size) * camera.width_px))
+    distance = float(np.ptp(outline[:, 0]) * camera.matrix_px[0, 0] / (rng.uniform(*_SIZE) * camera.width_px))
     for _ in range(_SHIFTS):
         ray = camera.rays(centre[None])[0]
         if not np.isfinite(ray).all():

@@ -11,28 +11,27 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+import msgspec
 import numpy as np
 
 from calib_core.boxes import boxes_text, labels_text
-from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import camera_info_text, write_clicks
+from calib_core.interchange.own.documents import camera_document
 from calib_core.lens_models.registry import written_lens
-from calib_core.measurements import RadarScan, RadarScans, TimeNs, time_parts
+from calib_core.measurements import RadarScan, TimeNs, time_parts
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,
-    ImageMessage,
     RadarReturnMessage,
     RecordedMessage,
-    VendorScanMessage,
+    Ros2Container,
     write_ros1_bag,
     write_ros2,
 )
-from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
 from calib_core.synthetic.annotations import is_annotated, true_boxes, true_labels
 from calib_core.synthetic.options import Clicking, Container, RadarDefects
 from calib_core.synthetic.radar_returns import Antenna, second_azimuths
@@ -81,9 +80,9 @@ def write_recording(
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
             written.append(write_ros1_bag(folder / "camera.bag", _pictures(recording, frames)))
         else:
-            name = folder / f"recording_{container}"
-            messages = all_messages(recording, 2, frames)
-            written.append(write_ros2(name, messages, container="mcap" if container == "mcap" else "sqlite3"))
+            messages = _by_arrival(_pictures(recording, frames), radar_messages(recording, 2))
+            storage: Ros2Container = "mcap" if container == "mcap" else "sqlite3"
+            written.append(write_ros2(folder / f"recording_{container}", messages, container=storage))
     _write_truth(recording, folder)
     if other is not None:
         _write_truth(other, folder, "_2")
@@ -106,16 +105,7 @@ def _counted(recording: SimulatedRecording, progress: Progress, *, before: int, 
 
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_HEADER = (
-    "Timestamp",
-    "Track",
-    "Range [m]",
-    "Azimuth (deg)",
-    "Elevation (deg)",
-    "Doppler [m/s]",
-    "RCS (dBsm)",
-    "Quality",
-)
+_HEADER = "Timestamp;Track;Range [m];Azimuth (deg);Elevation (deg);Doppler [m/s];RCS (dBsm);Quality\n"
 
 
 def write_plain_files(
@@ -154,28 +144,22 @@ def _date(time: TimeNs) -> datetime:
 
 def _table(recording: SimulatedRecording, antenna: Antenna) -> Iterator[str]:
     """Yield the lines of a table whose times are dates, in the manner of logging software."""
-    yield _line(_HEADER)
+    yield _HEADER
     for scan in recording.scans_of(antenna):
         when = f"{_date(scan.time):%Y/%m/%d %H:%M:%S.%f}"
         polar = polar_from_cartesian(scan.points_radar_m)
         columns = (polar[:, 0], *np.rad2deg(polar[:, 1:]).T, scan.doppler_mps, scan.snr_db)
         for number, row in enumerate(np.column_stack(columns).tolist()):
-            yield _line((when, str(number), *(f"{value:.6f}" for value in row), "1"))
-
-
-def _line(cells: Iterable[str]) -> str:
-    return ";".join(cells) + "\n"
+            yield ";".join((when, str(number), *(f"{value:.6f}" for value in row), "1")) + "\n"
 
 
 def _objects(recording: SimulatedRecording, antenna: Antenna) -> Iterator[str]:
-    for scan in recording.scans_of(antenna):
-        yield json.dumps(_object(scan)) + "\n"
-
-
-def _object(scan: RadarScan) -> dict[str, object]:
+    """Yield a line of JSON per scan."""
     names = ("x_m", "y_m", "z_m", "doppler_mps", "snr_db")
-    rows = np.column_stack([scan.points_radar_m, scan.doppler_mps, scan.snr_db]).round(6).tolist()
-    return {"time_ns": int(scan.time), "targets": [dict(zip(names, row, strict=True)) for row in rows]}
+    for scan in recording.scans_of(antenna):
+        rows = np.column_stack([scan.points_radar_m, scan.doppler_mps, scan.snr_db]).round(6).tolist()
+        targets = [dict(zip(names, row, strict=True)) for row in rows]
+        yield json.dumps({"time_ns": int(scan.time), "targets": targets}) + "\n"
 
 
 _PIXEL_DECIMALS = 6
@@ -184,18 +168,17 @@ _PIXEL_DECIMALS = 6
 
 def truth_text(recording: SimulatedRecording) -> str:
     """Return the truth about a recording (schema cocalib/truth-1). No estimator may read it."""
-    pose = recording.camera_from_radar
+    stage, options = recording.stage, recording.options
     document: dict[str, Any] = {
         "schema": "cocalib/truth-1",
-        "camera_from_radar": _transform(pose),
-        "camera": _camera(recording.camera),
-        "radar_stamps_ahead_s": recording.stage.profile.latency_s + recording.options.clock_offset_s,
-        "seed": recording.options.seed,
+        "camera_from_radar": _transform(recording.camera_from_radar),
+        "camera": msgspec.to_builtins(camera_document(recording.camera)),
+        "radar_stamps_ahead_s": stage.profile.latency_s,
+        "seed": options.seed,
         "placements": [
             {
                 "id": placement.id,
-                "start": _time(placement.start),
-                "end": _time(placement.end),
+                **_span(placement.start, placement.end),
                 "position_radar_m": placement.position_radar_m.tolist(),
                 "pixel_px": placement.pixel_px.round(_PIXEL_DECIMALS).tolist(),
                 "best_image_time": _time(placement.best_image_time),
@@ -203,16 +186,18 @@ def truth_text(recording: SimulatedRecording) -> str:
             for placement in recording.placements
         ],
     }
-    defects = recording.options.defects
+    defects = options.defects
     if defects.azimuth_bias_deg or defects.elevation_bias_deg or defects.z_offset_m:
-        document["camera_from_reported"] = _transform(recording.stage.camera_from_reported)
-    if recording.stage.waving is not None:
-        document["board"] = _board(recording)
-    if recording.options.clicking != Clicking():
+        document["camera_from_reported"] = _transform(stage.camera_from_reported)
+    if stage.waving is not None:
+        board, when = stage.waving.board, _span(*stage.recorded_span(0.0, options.waved_board_s))
+        size = {"columns": board.columns, "rows": board.rows, "square_m": board.square_m}
+        document["board"] = {"kind": board.kind, **size, **when}
+    if options.clicking != Clicking():
         document["clicks"] = [
             {"id": one.click.id, "placement": one.placement_id, "faults": list(one.faults)} for one in recording.clicked
         ]
-    return _text(document)
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
 def clicks_text(recording: SimulatedRecording) -> str:
@@ -229,43 +214,19 @@ def _time(time: TimeNs) -> dict[str, int]:
     return {"sec": sec, "nanosec": nanosec}
 
 
-def _camera(camera: Camera) -> dict[str, Any]:
-    return {
-        "model": camera.model,
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "matrix_px": camera.matrix_px.tolist(),
-        "distortion": camera.distortion.tolist(),
-    }
+def _span(start: TimeNs, end: TimeNs) -> dict[str, dict[str, int]]:
+    return {"start": _time(start), "end": _time(end)}
 
 
-def _board(recording: SimulatedRecording) -> dict[str, Any]:
-    """Return the board that is waved at the start, and when."""
-    board = recording.options.waved_board
-    start, end = recording.stage.recorded_span(0.0, board.duration_s)
-    size = {"columns": board.columns, "rows": board.rows, "square_m": board.square_mm / 1e3}
-    return {"kind": "checkerboard", **size, "start": _time(start), "end": _time(end)}
-
-
-def _text(document: dict[str, Any]) -> str:
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-RADAR_SCAN_TOPIC = "/ti_mmwave/radar_scan"
 CLOUD_TOPIC = RadarDefects().cloud_topic
-VENDOR_TOPIC = "/acme/packets"
-RAW_IMAGE_TOPIC = "/camera/image_raw"
-IMAGE_TOPIC = "/camera/image_raw/compressed"
-CAMERA_INFO_TOPIC = "/camera/camera_info"
 SECOND_SUFFIX = "_second_azimuth"
 """Of the topic with the same returns at their second azimuths."""
 SECOND_COLUMN = "azimuth_2"
 """Or of the column with the second azimuth [rad]."""
-RADAR_FRAME = "ti_mmwave_0"
 SIDE_TOPIC, SIDE_FRAME = "/radar_left/points", "radar_left"
-CAMERA_FRAME = "camera_optical_frame"
-
-_TRANSFER_NS = 3_000_000
+TRANSFER_NS = 3_000_000
+"""From a cloud's stamp to the recorder, where that is not drawn."""
+_RADAR_FRAME = "ti_mmwave_0"
 _PARSE_NS = 6_000
 """The driver stamps each return as it parses it; parsing one takes about this long."""
 
@@ -280,28 +241,25 @@ def camera_messages(
         frames: to use instead of all frames of the recording.
         name: of the camera, in topics and frame.
     """
-    options, frame_id = recording.options, CAMERA_FRAME.replace("camera", name)
-    image, raw_image, camera_info = (
-        topic.replace("/camera/", f"/{name}/") for topic in (IMAGE_TOPIC, RAW_IMAGE_TOPIC, CAMERA_INFO_TOPIC)
-    )
+    options, frame_id = recording.options, f"{name}_optical_frame"
     for frame in recording.frames() if frames is None else frames:
         if options.intrinsics.published:
             info = CameraInfoMessage(frame.time, frame_id, recording.stage.published_camera)
-            yield RecordedMessage(camera_info, frame.receive_time, info)
-        if options.raw_images:
-            raw = ImageMessage(frame.time, frame_id, frame.pixels)
-            yield RecordedMessage(raw_image, frame.receive_time, raw)
-        else:
-            jpeg = CompressedImageMessage(
-                frame.time, frame_id, frame.jpeg(options.jpeg_quality), "bgr8; jpeg compressed bgr8"
-            )
-            yield RecordedMessage(image, frame.receive_time, jpeg)
+            yield RecordedMessage(f"/{name}/camera_info", frame.receive_time, info)
+        data = frame.jpeg(options.jpeg_quality)
+        image = CompressedImageMessage(frame.time, frame_id, data, "bgr8; jpeg compressed bgr8")
+        yield RecordedMessage(f"/{name}/image_raw/compressed", frame.receive_time, image)
 
 
-def _pictures(recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None) -> Iterator[RecordedMessage]:
-    streams = [camera_messages(recording, frames)]
-    if recording.other_camera is not None:
-        streams.append(camera_messages(recording.other_camera, name="camera_2"))
+def _pictures(recording: SimulatedRecording, frames: Iterable[SimulatedFrame]) -> Iterator[RecordedMessage]:
+    other = recording.other_camera
+    return _by_arrival(
+        camera_messages(recording, frames), *([] if other is None else [camera_messages(other, name="camera_2")])
+    )
+
+
+def _by_arrival(*streams: Iterable[RecordedMessage]) -> Iterator[RecordedMessage]:
+    """Merge messages as one recorder would receive them."""
     return heapq.merge(*streams, key=lambda message: message.receive_time)
 
 
@@ -310,74 +268,46 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
 
     Args:
         recording: the recording.
-        generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds or a vendor's scans.
+        generation: of ROS; 1 writes a message per return where the radar is an AWR1843 with one antenna and one azimuth of
+            each return, otherwise clouds are written.
     """
-    if recording.options.defects.ideal_topic:
-        return _ideal_messages(recording)
     streams = [_antenna_messages(recording, antenna, generation) for antenna in recording.stage.antennas]
     if recording.options.defects.side_radar:
-        streams.append(_side_messages(recording))
-    return heapq.merge(*streams, key=lambda message: message.receive_time)
+        streams.append(
+            cloud_message(SIDE_TOPIC, scan, TimeNs(scan.time + TRANSFER_NS), frame=SIDE_FRAME)
+            for scan in side_scans(recording.stage)
+        )
+    return _by_arrival(*streams)
 
 
 def _antenna_messages(
     recording: SimulatedRecording, antenna: Antenna, generation: Literal[1, 2]
 ) -> Iterator[RecordedMessage]:
     options, second = recording.options, recording.options.defects.second_azimuth
-    vendor = options.radar_message == "vendor"
-    cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
-    cloud = cloud or second != "none" or bool(antenna.name)
-    base = VENDOR_TOPIC if vendor else options.defects.cloud_topic
-    topic = f"{base}_{antenna.name}" if antenna.name else base
+    cloud = generation == 2 or options.radar == "imaging" or second != "none" or bool(antenna.name)
+    topic = f"{options.defects.cloud_topic}{'_' if antenna.name else ''}{antenna.name}"
     for scan, receive in zip(recording.scans_of(antenna), antenna.times.receive_ns, strict=True):
-        if vendor:
-            yield _vendor_scan(topic, scan, TimeNs(int(receive)))
-            continue
         if not cloud:
             yield from _returns(recording, scan, int(receive))
             continue
-        yield _cloud(topic, scan, TimeNs(int(receive)), second_column=second == "column")
+        yield cloud_message(topic, scan, TimeNs(int(receive)), second_column=second == "column")
         if second == "topic":
             other = replace(scan, points_radar_m=second_azimuths(scan.points_radar_m))
-            yield _cloud(f"{topic}{SECOND_SUFFIX}", other, TimeNs(int(receive)))
+            yield cloud_message(f"{topic}{SECOND_SUFFIX}", other, TimeNs(int(receive)))
 
 
-def _ideal_messages(recording: SimulatedRecording) -> Iterator[RecordedMessage]:
-    """Put the returns that all antennas report in one moment into one cloud; none is left out."""
-    parts = [RadarScans.from_scans(list(recording.scans_of(antenna))) for antenna in recording.stage.antennas]
-    moments = moments_of([part.times_ns for part in parts])
-    together = [aligned(part, own, moments.times_ns) for part, own in zip(parts, moments.scan_of, strict=True)]
-    scans = merged(together, [Spread(np.full(3, 1e-9), 1e-9)] * len(parts), list(range(len(parts))))
-    for number in range(len(scans)):
-        scan = scans.scan(number)
-        yield _cloud(recording.options.defects.cloud_topic, scan, TimeNs(scan.time + _TRANSFER_NS))
-
-
-def _side_messages(recording: SimulatedRecording) -> Iterator[RecordedMessage]:
-    for scan in side_scans(recording.stage):
-        yield _cloud(SIDE_TOPIC, scan, TimeNs(scan.time + _TRANSFER_NS), frame=SIDE_FRAME)
-
-
-def all_messages(
-    recording: SimulatedRecording, generation: Literal[1, 2], frames: Iterable[SimulatedFrame] | None = None
-) -> Iterator[RecordedMessage]:
-    """Merge both sensors' messages as one recorder would receive them.
+def cloud_message(
+    topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool = False, frame: str = _RADAR_FRAME
+) -> RecordedMessage:
+    """Convert a scan to a cloud.
 
     Args:
-        recording: the recording.
-        generation: of ROS.
-        frames: to use instead of all frames of the recording.
+        topic: of the message.
+        scan: its returns.
+        receive: when the recorder got it.
+        second_column: whether it has a column with the second azimuth.
+        frame: of the radar.
     """
-    return heapq.merge(
-        _pictures(recording, frames),
-        radar_messages(recording, generation),
-        key=lambda message: message.receive_time,
-    )
-
-
-def _cloud(
-    topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool = False, frame: str = RADAR_FRAME
-) -> RecordedMessage:
     names: tuple[str, ...] = ("x", "y", "z", "intensity", "velocity")
     columns = [scan.points_radar_m, scan.snr_db, scan.doppler_mps]
     if second_column:
@@ -386,32 +316,13 @@ def _cloud(
     return RecordedMessage(topic, receive, CloudMessage(scan.time, frame, names, np.column_stack(columns)))
 
 
-def _vendor_scan(topic: str, scan: RadarScan, receive: TimeNs) -> RecordedMessage:
-    polar = polar_from_cartesian(scan.points_radar_m)
-    return RecordedMessage(
-        topic, receive, VendorScanMessage(scan.time, RADAR_FRAME, polar, scan.doppler_mps, scan.snr_db)
-    )
-
-
 def _returns(recording: SimulatedRecording, scan: RadarScan, receive: int) -> Iterator[RecordedMessage]:
     """Yield one message per return, each stamped slightly later, as the TI driver does."""
-    filled = recording.options.radar_message == "filled"
-    profile = recording.stage.profile
-    ranges = np.linalg.norm(scan.points_radar_m, axis=1)
-    bearings = np.rad2deg(np.arctan2(scan.points_radar_m[:, 1], scan.points_radar_m[:, 0]))
+    profile, points = recording.stage.profile, scan.points_radar_m
+    ranges = np.linalg.norm(points, axis=1)
+    bearings = np.rad2deg(np.arctan2(points[:, 1], points[:, 0]))
     bins = np.round(scan.doppler_mps / profile.doppler_bin_mps).astype(int) + profile.doppler_bins // 2
-    for i, point in enumerate(scan.points_radar_m.tolist()):
-        body = RadarReturnMessage(
-            TimeNs(scan.time + i * _PARSE_NS),
-            RADAR_FRAME,
-            i,
-            point[0],
-            point[1],
-            point[2],
-            range_m=float(ranges[i]) if filled else 0.0,
-            velocity_mps=float(scan.doppler_mps[i]),
-            doppler_bin=int(bins[i]) if filled else 0,
-            bearing_deg=float(bearings[i]) if filled else 0.0,
-            intensity_db=float(scan.snr_db[i]) if filled else 0.0,
-        )
-        yield RecordedMessage(RADAR_SCAN_TOPIC, TimeNs(receive + i * _PARSE_NS), body)
+    columns = (*points.T, ranges, scan.doppler_mps, bins, bearings, scan.snr_db)
+    for i, row in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+        body = RadarReturnMessage(TimeNs(scan.time + i * _PARSE_NS), _RADAR_FRAME, i, *row)
+        yield RecordedMessage("/ti_mmwave/radar_scan", TimeNs(receive + i * _PARSE_NS), body)

@@ -11,7 +11,6 @@ from calib_core.options import option
 from calib_core.synthetic.rig import RigOptions
 
 RadarName = Literal["awr1843", "imaging"]
-RadarMessage = Literal["filled", "stock", "cloud", "vendor"]
 ReportedElevation = Literal["measured", "zero", "rounding"]
 SecondAzimuth = Literal["none", "column", "topic"]
 
@@ -41,7 +40,10 @@ class RadarDefects:
     )
     range_bin_m: float | None = option(None, "Width of a range bin [m]; by default the radar's.", low=0.001, high=1.0)
     azimuth_bins: int | None = option(
-        None, "Bins over the sine of the azimuth from -1 to 1, 0 to interpolate; by default the radar's.", high=4096
+        None,
+        "Bins over the sine of the azimuth from -1 to 1, 0 to interpolate; by default the radar's.",
+        low=0,
+        high=4096,
     )
     elevation_bins: int = option(0, "The same for the elevation.", low=0, high=4096)
     scatter_range_m: float | None = option(
@@ -81,10 +83,6 @@ class RadarDefects:
         0.15, "Share of the ranges at which the second azimuth is the true one.", low=0.0, high=1.0
     )
     cloud_topic: str = option("/ti_mmwave/radar_scan_pcl", "Topic of the radar's clouds, where it sends clouds.")
-    ideal_topic: bool = option(
-        False,
-        "Publish the same returns in one topic, near and far ones of a moment in one cloud, each at its true azimuth.",
-    )
     side_radar: bool = option(
         False, "Also publish the clouds of a weaker radar that looks 60 deg to the left, in /radar_left/points."
     )
@@ -92,7 +90,6 @@ class RadarDefects:
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"]
 Clutter = Literal["none", "scene", "heavy"]
-ReflectorDesign = Literal["triangular", "square"]
 Container = Literal["ros1", "mcap", "db3", "csv", "jsonl"]
 
 
@@ -101,8 +98,6 @@ class Surroundings:
     """What stands and walks in the scene besides the reflector."""
 
     companion: bool = option(False, "Put a cart behind each reflector, at every placement.")
-    companion_distance_m: float = option(1.0, "How far behind the reflector the cart stands [m].", low=0.3, high=5.0)
-    companion_dbsm: float = option(18.0, "Radar cross-section of the cart; the reflector has 12 [dBsm].", high=60.0)
     parked_cars: int = option(0, "Number of parked cars at the sides of the scene.", low=0, high=8)
     fence: bool = option(False, "Put a fence with metal posts along one side of the scene.")
     strong_target_dbsm: float | None = option(
@@ -154,30 +149,6 @@ class IntrinsicsErrors:
 
 
 @dataclass(frozen=True, slots=True)
-class WavedBoard:
-    """The checkerboard that the person waves before the camera at the start, to calibrate its lens with."""
-
-    duration_s: float = option(0.0, "How long it is waved; 0 for no board [s].", low=0.0, high=600.0)
-    columns: int = option(9, "Inner corners along its rows.", low=3, high=40)
-    rows: int = option(6, "Inner corners along its columns.", low=3, high=40)
-    square_mm: float = option(22.14, "Side of a square [mm].", low=1.0, high=1000.0)
-    bend_mm: float = option(0.0, "How far its middle stands behind its left and right side [mm].", low=-50.0, high=50.0)
-
-
-@dataclass(frozen=True, slots=True)
-class OtherCamera:
-    """A second camera, on a rig of its own, that sees the same placements."""
-
-    present: bool = option(False, "Record a second camera in /camera_2; clicks_2.json and truth_2.json are its files.")
-    offset_m: tuple[float, float, float] = option(
-        (-0.4, 0.9, 0.25), "Its nominal centre in the radar frame: forward, left, up [m]."
-    )
-    yaw_deg: float = option(
-        -5.0, "How far to the left it nominally looks of where the radar looks [deg].", low=-180.0, high=180.0
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class Clicking:
     """How the example clicks are made."""
 
@@ -200,8 +171,12 @@ class SimulationOptions:
         "yard with nothing that echoes within 20 m (the yard has a checkerboard on a stand), or a road.",
     )
     radar: RadarName = option("awr1843", "Radar: a TI AWR1843 with its bins, or a finer imaging radar.")
-    placements: int = option(20, "Number of placements of the reflector; 0 for none, where something else moves.")
-    dwell_s: float = option(6.0, "How long the reflector stays at each placement, from release to pick-up [s].")
+    placements: int = option(
+        20, "Number of placements of the reflector; 0 for none, where something else moves.", low=0, high=1000
+    )
+    dwell_s: float = option(
+        6.0, "How long the reflector stays at each placement, from release to pick-up [s].", low=3.5, high=3600.0
+    )
     heights: bool = option(False, "Put the reflector on a tripod of varying height instead of on the ground.")
     clutter: Clutter = option(
         "scene", "Static radar returns: none, from the visible scene, or also from strong invisible objects."
@@ -211,30 +186,16 @@ class SimulationOptions:
     field_of_view_deg: float | None = option(
         None, "Horizontal field of view before distortion [deg]; by default 75, or 110 for equidistant."
     )
-    width_px: int = option(1280, "Image width in pixels.")
-    height_px: int = option(720, "Image height in pixels.")
-    camera_rate_hz: float = option(5.0, "Frames per second.")
-    radar_rate_hz: float = option(10.0, "Scans per second.")
-    angle_bins: bool = option(
-        True, "Report azimuths on the grid of the radar's angle bins; otherwise interpolate the peak."
-    )
-    radar_message: RadarMessage = option(
-        "filled",
-        'In ROS 1 bags: one RadarScan message per return with all fields filled ("filled"), or with range, bearing, Doppler '
-        'bin and intensity zero as in the stock driver ("stock"), or one PointCloud2 per scan ("cloud"). In any bag: one '
-        'message per scan in the manner of a vendor, with an array of structs ("vendor").',
-    )
-    raw_images: bool = option(False, "Write sensor_msgs/Image instead of JPEG.")
-    jpeg_quality: int = option(85, "JPEG quality, 1 to 100.")
+    width_px: int = option(1280, "Image width in pixels.", low=64, high=16384)
+    height_px: int = option(720, "Image height in pixels.", low=64, high=16384)
+    camera_rate_hz: float = option(5.0, "Frames per second.", low=0.01, high=1000.0)
+    radar_rate_hz: float = option(10.0, "Scans per second.", low=0.01, high=1000.0)
+    jpeg_quality: int = option(85, "JPEG quality.", low=1, high=100)
     sensor_noise_grey: float = option(
         0.0, "Standard deviation of the camera's noise [grey levels of 255]; makes JPEG larger."
     )
-    stamp_jitter_s: float = option(0.002, "Standard deviation of the timing of both sensors [s].")
-    dropped_share: float = option(0.01, "Fraction of frames and scans that are lost.")
-    clock_offset_s: float = option(0.0, "How far the radar's stamps are ahead of the camera's clock [s].")
     click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].")
-    start_s: int = option(1_760_000_000, "Start of the recording [s since 1970].")
-    seed: int = option(1, "Seed of the random generator.")
+    seed: int = option(1, "Seed of the random generator.", low=0)
     reflectors: int = option(
         1, "Number of reflectors, moved in turn; the example clicks name all that stand.", low=1, high=4
     )
@@ -246,7 +207,11 @@ class SimulationOptions:
     )
     islands: bool = option(False, "Record only 2 to 15 s around each dwell, with gaps of 1 to 5 minutes between.")
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
-    other_camera: OtherCamera = option(OtherCamera(), "A second camera, on another rig.")
+    other_camera: bool = option(
+        False,
+        "Record a second camera in /camera_2, on a rig of its own, that sees the same placements; clicks_2.json and truth_2.json "
+        "are its files.",
+    )
     defects: RadarDefects = option(RadarDefects(), "How the radar differs from a perfect one.")
     surroundings: Surroundings = option(Surroundings(), "What stands and walks in the scene besides the reflector.")
     intrinsics: IntrinsicsErrors = option(
@@ -254,17 +219,18 @@ class SimulationOptions:
     )
     clicking: Clicking = option(Clicking(), "How the example clicks are made.")
     traffic: Traffic = option(Traffic(), "Who moves in front of the sensors to be judged.")
-    waved_board: WavedBoard = option(WavedBoard(), "The checkerboard that is waved before the camera at the start.")
+    waved_board_s: float = option(
+        0.0,
+        "How long the person waves a checkerboard before the camera at the start, to calibrate its lens with; 0 for no board "
+        "[s].",
+        low=0.0,
+        high=600.0,
+    )
     reflector_edge_m: float = option(
         0.16,
         "Length of the edges that meet at the reflector's apex [m]; its echo grows with the fourth power.",
         low=0.05,
         high=1.0,
-    )
-    reflector_design: ReflectorDesign = option(
-        "triangular",
-        "Look of the reflector, not its echo: three triangles on an orange block or a dark tripod; or three dull squares, "
-        "one edge down, on a white pole.",
     )
     board_corners: int = option(
         0, "Number of further placements, in front of inner corners of the checkerboard.", low=0, high=40
@@ -275,25 +241,8 @@ class SimulationOptions:
     )
 
     def __post_init__(self) -> None:
-        _require(self.placements >= 0, "placements", self.placements, "at least 0")
-        _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s, for the person to step away and return")
-        _require(min(self.camera_rate_hz, self.radar_rate_hz) > 0, "rates", self.camera_rate_hz, "more than 0 Hz")
-        _require(1 <= self.jpeg_quality <= 100, "jpeg_quality", self.jpeg_quality, "1 to 100")
-        _require(0.0 <= self.dropped_share < 0.9, "dropped_share", self.dropped_share, "0 to 0.9")
-        _require(min(self.width_px, self.height_px) >= 64, "image size", self.width_px, "at least 64 px")
-        roomy = self.scene != "aisle" or not (self.surroundings.parked_cars or self.surroundings.fence)
-        _require(roomy, "scene", self.scene, "another one: the aisle has no room for parked cars or a fence")
         _check_ranges(self)
-        _check_traffic(self)
-        _require(
-            self.reflectors_apart_m is None or (self.reflectors > 1 and self.board_corners == 0),
-            "reflectors_apart_m",
-            self.reflectors_apart_m,
-            "left out with one reflector, or with placements at the checkerboard's corners",
-        )
-        waved = self.waved_board.duration_s > 0.0
-        _require(not (waved and self.islands), "islands", True, "False where a board is waved before the placements")
-        _require(not waved or self.standing_places > 0, "placements", 0, "at least 1 after a board is waved")
+        _check_combinations(self)
 
     @property
     def standing_places(self) -> int:
@@ -301,13 +250,13 @@ class SimulationOptions:
         return self.placements + self.board_corners
 
 
-def _check_traffic(options: SimulationOptions) -> None:
-    """Check that what moves has room for it, and that there is something to record.
+def _check_combinations(options: SimulationOptions) -> None:
+    """Check that everything has room in the scene, and that there is something to record.
 
     Raises:
         OptionError: says what does not go together, and what to do.
     """
-    traffic, scene = options.traffic, options.scene
+    traffic, scene, surroundings = options.traffic, options.scene, options.surroundings
     only = (
         (traffic.robots, "traffic.robots", ("aisle",), "scene=aisle"),
         (traffic.cars, "traffic.cars", ("road",), "scene=road"),
@@ -315,16 +264,23 @@ def _check_traffic(options: SimulationOptions) -> None:
     )
     for number, name, scenes, remedy in only:
         _require(not number or scene in scenes, name, number, f"0 in the scene {scene}; ask for {remedy}")
-    _require(
-        not traffic.walkers or scene != "road", "traffic.walkers", traffic.walkers, "0 on the road, where cars drive"
-    )
+    roomy = scene != "aisle" or not (surroundings.parked_cars or surroundings.fence)
+    _require(roomy, "scene", scene, "another one: the aisle has no room for parked cars or a fence")
+    walkable = scene != "road" or not traffic.walkers
+    _require(walkable, "traffic.walkers", traffic.walkers, "0 on the road, where cars drive")
     length_m = traffic.farthest_m - traffic.nearest_m
     _require(length_m >= 12.0, "traffic.farthest_m", traffic.farthest_m, "at least 12 m beyond traffic.nearest_m")
     room = int((2.0 * length_m + 20.0) / 12.0)
     _require(traffic.cars <= room, "traffic.cars", traffic.cars, f"at most {room} on a round of this length")
     several = options.defects.near_and_far or options.defects.side_radar or options.defects.second_azimuth != "none"
     _require(not (traffic.any and several), "traffic", "given", "without a radar of several topics")
+    apart_m, by_turns = options.reflectors_apart_m, options.reflectors > 1 and options.board_corners == 0
+    wanted = "left out with one reflector, or with placements at the checkerboard's corners"
+    _require(apart_m is None or by_turns, "reflectors_apart_m", apart_m, wanted)
+    waved = options.waved_board_s > 0.0
+    _require(not (waved and options.islands), "islands", True, "False where a board is waved before the placements")
     if not options.standing_places:
+        _require(not waved, "placements", 0, "at least 1 after a board is waved")
         _require(traffic.any, "placements", 0, "at least 1 where nothing else moves; or ask for traffic.walkers=2")
         _require(not options.islands, "islands", True, "False without placements, around which islands are recorded")
 
@@ -341,7 +297,8 @@ def _check_ranges(options: Any, prefix: str = "") -> None:
             _check_ranges(value, f"{name}.")
         elif isinstance(value, int | float) and not isinstance(value, bool):
             low, high = field.metadata["low"], field.metadata["high"]
-            _require(math.isfinite(value) and low <= value <= high, name, value, f"{low:g} to {high:g}")
+            wanted = f"at least {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
+            _require(math.isfinite(value) and low <= value <= high, name, value, wanted)
 
 
 def _require(good: bool, name: str, value: object, wanted: str) -> None:

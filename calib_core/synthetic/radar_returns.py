@@ -7,13 +7,13 @@ Two kinds of radar have a resolution and a noise, which the options change; one 
 assumptions in line with vendors' figures and with an array simulation; no real radar was measured.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points3, Values, frozen_array
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import NS_PER_S, RadarScan, TimeNs
+from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic.options import RadarDefects, RadarName, SimulationOptions
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_times
@@ -133,7 +133,7 @@ def _sine(angle_deg: float | None) -> float | None:
 
 _NEAR_HZ, _NEAR_END_M = 25.0, 10.0
 _FAR_HZ, _FAR_BEGIN_M = 20.0, 5.0
-_IN_TURN_HZ, _IN_TURN_END_M = 13.0, 30.0
+_IN_TURN_HZ, _IN_TURN_END_M, _FIRST_S = 13.0, 30.0, 0.05
 _NEAR_BEAM_DEG, _FAR_BEAM_DEG = 60.0, 20.0
 _NEAR_GAIN_DB, _FAR_GAIN_DB = -4.0, 8.0
 _NEAR_COARSER = 2.0
@@ -164,7 +164,7 @@ def antennas_of(
     rngs: tuple[np.random.Generator, np.random.Generator],
     *,
     duration_s: float,
-    islands: Islands | None,
+    islands: Islands,
 ) -> tuple[Antenna, ...]:
     """Return the antennas with their times; of two the far one first.
 
@@ -178,34 +178,11 @@ def antennas_of(
 
     def times(rng: np.random.Generator, rate_hz: float, first_s: float | None = None) -> SensorTimes:
         return draw_times(
-            rng,
-            duration_s=duration_s,
-            rate_hz=rate_hz,
-            jitter_s=options.stamp_jitter_s,
-            dropped_share=options.dropped_share,
-            latency_s=profile.latency_s + options.clock_offset_s,
-            transfer_s=0.003,
-            start_ns=options.start_s * NS_PER_S,
-            islands=islands,
-            first_s=first_s,
+            rng, duration_s, rate_hz, latency_s=profile.latency_s, transfer_s=0.003, islands=islands, first_s=first_s
         )
 
     if not options.defects.near_and_far:
         return (Antenna("", profile, times(rngs[0], options.radar_rate_hz)),)
-    near, far = _near_and_far(profile)
-    if options.defects.in_turn:
-        begin_s = 0.05
-        return (
-            Antenna("far", far, times(rngs[0], _IN_TURN_HZ, begin_s), min_range_m=_FAR_BEGIN_M),
-            Antenna("near", near, times(rngs[1], _IN_TURN_HZ, begin_s + 0.5 / _IN_TURN_HZ), max_range_m=_IN_TURN_END_M),
-        )
-    return (
-        Antenna("far", far, times(rngs[0], _FAR_HZ), min_range_m=_FAR_BEGIN_M),
-        Antenna("near", near, times(rngs[1], _NEAR_HZ), max_range_m=_NEAR_END_M),
-    )
-
-
-def _near_and_far(profile: RadarProfile) -> tuple[RadarProfile, RadarProfile]:
     near = replace(
         profile,
         beam_azimuth_deg=_NEAR_BEAM_DEG,
@@ -214,7 +191,15 @@ def _near_and_far(profile: RadarProfile) -> tuple[RadarProfile, RadarProfile]:
         resolution_azimuth=_NEAR_COARSER * profile.resolution_azimuth,
     )
     far = replace(profile, beam_azimuth_deg=_FAR_BEAM_DEG, snr_at_10_m_db=profile.snr_at_10_m_db + _FAR_GAIN_DB)
-    return near, far
+    if options.defects.in_turn:
+        far_times, near_end_m = times(rngs[0], _IN_TURN_HZ, _FIRST_S), _IN_TURN_END_M
+        near_times = times(rngs[1], _IN_TURN_HZ, _FIRST_S + 0.5 / _IN_TURN_HZ)
+    else:
+        far_times, near_times, near_end_m = times(rngs[0], _FAR_HZ), times(rngs[1], _NEAR_HZ), _NEAR_END_M
+    return (
+        Antenna("far", far, far_times, min_range_m=_FAR_BEGIN_M),
+        Antenna("near", near, near_times, max_range_m=near_end_m),
+    )
 
 
 _MISSED = 0.02
@@ -247,14 +232,10 @@ class Targets:
 
     def __post_init__(self) -> None:
         n = len(self.points_radar_m)
-        for name, shape in (
-            ("points_radar_m", (n, 3)),
-            ("velocity_mps", (n,)),
-            ("rcs_dbsm", (n,)),
-            ("fading_db", (n,)),
-            ("bias", (n, 3)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        for name in ("points_radar_m", "bias"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (n, 3)))
+        for name in ("velocity_mps", "rcs_dbsm", "fading_db"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (n,)))
         object.__setattr__(self, "hidden", frozen_array(self.hidden, (n,), dtype=np.bool_))
 
     def __len__(self) -> int:
@@ -263,16 +244,9 @@ class Targets:
     def within(self, min_range_m: float, max_range_m: float) -> "Targets":
         """Return only the objects between two ranges."""
         range_m = np.linalg.norm(self.points_radar_m, axis=1)
-        rows = (range_m >= min_range_m) & (range_m <= max_range_m)
-        return Targets(
-            self.points_radar_m[rows],
-            self.velocity_mps[rows],
-            self.rcs_dbsm[rows],
-            self.fading_db[rows],
-            self.bias[rows],
-            self.hidden[rows],
-            tuple(track for track, row in zip(self.tracks, rows, strict=True) if row) if self.tracks else (),
-        )
+        rows = np.flatnonzero((range_m >= min_range_m) & (range_m <= max_range_m))
+        columns = {field.name: getattr(self, field.name)[rows] for field in fields(self)[:-1]}
+        return Targets(**columns, tracks=tuple(self.tracks[row] for row in rows))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -297,7 +271,6 @@ def measure(
     *,
     profile: RadarProfile,
     time: TimeNs,
-    angle_bins: bool = True,
     calibration_phase: float = 0.0,
     defects: RadarDefects = _NO_DEFECTS,
 ) -> Measured:
@@ -311,14 +284,13 @@ def measure(
         targets: the objects.
         profile: the radar.
         time: the stamp.
-        angle_bins: whether azimuths lie on the profile's lattice.
         calibration_phase: where the smooth angle error is zero; a property of one radar.
         defects: how the radar differs from a perfect one.
     """
     echoes = _echoes(rng, targets, profile, calibration_phase)
     echoes = _with_side_lobes(rng, echoes, profile)
     echoes = _with_false_alarms(rng, echoes, profile)
-    cosines, velocity = _on_bins(distorted(echoes.cosines, defects), echoes.velocity_mps, profile, angle_bins)
+    cosines, velocity = _on_bins(distorted(echoes.cosines, defects), echoes.velocity_mps, profile)
     kept = _resolved(cosines, velocity, echoes.snr_db, profile)
     kept = kept[np.argsort(cosines[kept, 0], kind="stable")]
     points = reported_points(rng, cosines[kept], defects).astype(np.float32).astype(np.float64)
@@ -396,16 +368,14 @@ def _with_false_alarms(rng: np.random.Generator, echoes: _Echoes, profile: Radar
     )
 
 
-def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile, angle_bins: bool) -> tuple[Points3, Values]:
+def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile) -> tuple[Points3, Values]:
     """Round range, azimuth and speed to the radar's bins."""
     cosines = cosines.copy()
     cosines[:, 0] = np.round(cosines[:, 0] / profile.range_bin_m) * profile.range_bin_m
-    if angle_bins and profile.angle_bins:
-        half = profile.angle_bins / 2.0
-        cosines[:, 1] = np.clip(np.round(cosines[:, 1] * half), -half, half - 1.0) / half
-    if profile.elevation_bins:
-        half = profile.elevation_bins / 2.0
-        cosines[:, 2] = np.clip(np.round(cosines[:, 2] * half), -half, half - 1.0) / half
+    for column, bins in ((1, profile.angle_bins), (2, profile.elevation_bins)):
+        if bins:
+            half = bins / 2.0
+            cosines[:, column] = np.clip(np.round(cosines[:, column] * half), -half, half - 1.0) / half
     cosines[:, 2] = np.clip(cosines[:, 2], -0.95, 0.95)
     half_bins = profile.doppler_bins // 2
     index = np.round(velocity / profile.doppler_bin_mps)
@@ -432,22 +402,14 @@ def _resolved(cosines: Points3, velocity: Values, snr: Values, profile: RadarPro
 _ROUNDING_RAD = 1e-6
 _PERIOD = 0.6
 """Distance of the two azimuths in sine: antennas 1.7 wavelengths apart cannot tell them apart."""
-_FADING_M = 0.9
-"""How often over range the wrong one of two azimuths is taken for the better one."""
 
 
 def distorted(cosines: Points3, defects: RadarDefects) -> Points3:
     """Apply scales and biases to what a perfect radar would measure."""
-    ideal = RadarDefects()
-    names = (
-        "azimuth_scale",
-        "elevation_scale",
-        "azimuth_bias_deg",
-        "elevation_bias_deg",
-        "range_bias_m",
-        "range_scale",
-    )
-    if all(getattr(defects, name) == getattr(ideal, name) for name in names):
+    scales = defects.range_scale, defects.azimuth_scale, defects.elevation_scale
+    if scales == (1.0, 1.0, 1.0) and not (
+        defects.range_bias_m or defects.azimuth_bias_deg or defects.elevation_bias_deg
+    ):
         return cosines
     r, u, w = cosines.T
     elevation = np.arcsin(np.clip(w, -1.0, 1.0))
@@ -474,8 +436,8 @@ def reported_points(rng: np.random.Generator, cosines: Points3, defects: RadarDe
     """
     r, u, w = cosines.T
     if defects.elevation != "measured":
-        size = _ROUNDING_RAD if defects.elevation == "rounding" else 0.0
-        w = size * rng.uniform(-1.0, 1.0, len(w)) if size else np.zeros(len(w))
+        flat = defects.elevation == "zero"
+        w = np.zeros(len(w)) if flat else _ROUNDING_RAD * rng.uniform(-1.0, 1.0, len(w))
     x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
     z = r * w + defects.z_offset_m if defects.z_offset_m else r * w
     points = np.stack([x, -r * u if defects.mirrored else r * u, z], axis=1)
@@ -501,14 +463,3 @@ def second_azimuths(points_radar_m: Points3) -> Points3:
     u = y / far
     other = far * (u - np.where(u >= 0.0, _PERIOD, -_PERIOD))
     return np.stack([np.sqrt(np.maximum(0.0, across**2 - other**2)), other, z], axis=1)
-
-
-def second_is_true(range_m: Values, phase: float, share: float) -> Flags:
-    """Return at which ranges the radar takes the wrong azimuth for the better one: a pattern of reflections, not chance.
-
-    Args:
-        range_m: (n,) of the returns.
-        phase: where the pattern begins, 0 to 1; a property of one recording.
-        share: of all ranges.
-    """
-    return np.asarray((range_m / _FADING_M + phase) % 1.0 < share)

@@ -1,4 +1,4 @@
-"""A simulated recording: frames are rendered on demand, so memory stays bounded."""
+"""A simulated recording: scans are measured and frames are rendered on demand, so memory stays bounded."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,15 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
+from calib_core.arrays import Points2, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
+from calib_core.measurements import RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.radar_returns import Antenna
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.scans import antenna_scans, radar_scans
+from calib_core.synthetic.scans import labelled_scans
 from calib_core.synthetic.scene.stage import SimulatedPlacement, Stage, child_rng, placements_of, set_stage
 
 
@@ -43,7 +43,7 @@ class SimulatedFrame:
         return bytes(data)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SimulatedRecording:
     """The data that two recorders would have written, and the truth.
 
@@ -51,15 +51,17 @@ class SimulatedRecording:
         stage: everything decided before the sensors measure.
         placements: the truth about each placement, in order of time.
         clicked: the example clicks with their truth; by default one per placement, with click noise.
+        first: of a second camera, the same recording through the first one, which has the same scans.
     """
 
     stage: Stage
     placements: tuple[SimulatedPlacement, ...]
     clicked: tuple[SimulatedClick, ...]
+    first: "SimulatedRecording | None" = None
 
     @property
     def clicks(self) -> tuple[ReflectorClick, ...]:
-        """The example clicks."""
+        """The example clicks; ids "c1", "c2", ..."""
         return tuple(one.click for one in self.clicked)
 
     @property
@@ -78,18 +80,55 @@ class SimulatedRecording:
         return self.stage.rig.camera_from_radar
 
     @property
+    def points_radar_m(self) -> Points3:
+        """The true position of each placement: (n, 3)."""
+        return np.array([placement.position_radar_m for placement in self.placements]).reshape(-1, 3)
+
+    @property
+    def pixels_px(self) -> Points2:
+        """The true pixel of each placement: (n, 2)."""
+        return np.array([placement.pixel_px for placement in self.placements]).reshape(-1, 2)
+
+    @property
     def other_camera(self) -> "SimulatedRecording | None":
         """The same recording as the second camera sees it; None if there is none."""
         stage = self.stage.of_other_camera
-        return None if stage is None else _recorded(stage)
+        return None if stage is None else _recorded(stage, self)
 
-    def scans(self) -> Iterator[RadarScan]:
-        """Yield the scans of all antennas in order of header stamps; the same scans every time."""
-        return radar_scans(self.stage)
+    @cached_property
+    def scans(self) -> RadarScans:
+        """The scans of all antennas, by header stamps."""
+        if self.first is not None:
+            return self.first.scans
+        return RadarScans.from_scans([scan for antenna in self.stage.antennas for scan in self.scans_of(antenna)])
 
     def scans_of(self, antenna: Antenna) -> Iterator[RadarScan]:
-        """Yield the scans of one of the stage's antennas."""
-        return antenna_scans(self.stage, antenna)
+        """Yield the scans of one of the stage's antennas; the same scans every time."""
+        return (scan for scan, _ in labelled_scans(self.stage, antenna))
+
+    @cached_property
+    def renderer(self) -> FrameRenderer:
+        """What draws the frames; its backdrop takes some seconds."""
+        stage, options = self.stage, self.options
+        companion = options.surroundings.companion
+        return FrameRenderer.of(stage.scene, stage.rig, companion=companion, edge_m=options.reflector_edge_m)
+
+    def picture(self, index: int, rng: np.random.Generator, renderer: FrameRenderer | None = None) -> np.ndarray:
+        """Render a frame: (h, w, 3) uint8, blue first.
+
+        Args:
+            index: of the frame.
+            rng: of the camera's noise.
+            renderer: to draw it with another look.
+        """
+        stage, options, moment_s = self.stage, self.options, float(self.stage.frame_times.moment_s[index])
+        return (renderer or self.renderer).render(
+            stage.story.at(moment_s),
+            person=options.person,
+            board=stage.waving.at(moment_s) if stage.waving else None,
+            noise_grey=options.sensor_noise_grey,
+            rng=rng,
+        )
 
     def frames(self, limit: int | None = None) -> Iterator[SimulatedFrame]:
         """Render and yield frames; the same frames every time.
@@ -97,18 +136,10 @@ class SimulatedRecording:
         Args:
             limit: number of frames from the start; None for all.
         """
-        stage, options = self.stage, self.options
-        renderer = FrameRenderer.of(
-            stage.scene, stage.rig, options.surroundings, options.reflector_edge_m, options.reflector_design
-        )
-        rng = child_rng(options, 11)
-        for i, moment_s in enumerate(stage.frame_times.moment_s[:limit]):
-            moment = stage.story.at(float(moment_s))
-            board = stage.waving.at(float(moment_s)) if stage.waving else None
-            noise_grey = options.sensor_noise_grey
-            pixels = renderer.render(moment, person=options.person, board=board, noise_grey=noise_grey, rng=rng)
-            header, receive = int(stage.frame_times.header_ns[i]), int(stage.frame_times.receive_ns[i])
-            yield SimulatedFrame(TimeNs(header), TimeNs(receive), pixels)
+        rng, times = child_rng(self.options, 11), self.stage.frame_times
+        for i in range(len(times))[:limit]:
+            header, receive = int(times.header_ns[i]), int(times.receive_ns[i])
+            yield SimulatedFrame(TimeNs(header), TimeNs(receive), self.picture(i, rng))
 
 
 def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
@@ -120,45 +151,6 @@ def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
     return _recorded(set_stage(options or SimulationOptions()))
 
 
-def _recorded(stage: Stage) -> SimulatedRecording:
+def _recorded(stage: Stage, first: SimulatedRecording | None = None) -> SimulatedRecording:
     placements = placements_of(stage)
-    return SimulatedRecording(stage, placements, clicks_of(stage, placements))
-
-
-_JPEG_QUALITY = 90
-
-
-class SimulatedPictures:
-    """Renders any frame; its camera noise is a draw of its own, so pixels differ from those of `frames()` by noise."""
-
-    def __init__(self, recording: SimulatedRecording, renderer: FrameRenderer | None = None) -> None:
-        self._recording = recording
-        self._given = renderer
-        self.image_times: TimesNs = recording.stage.frame_times.header_ns
-
-    @cached_property
-    def _renderer(self) -> FrameRenderer:
-        if self._given is not None:
-            return self._given
-        stage, options = self._recording.stage, self._recording.options
-        return FrameRenderer.of(
-            stage.scene, stage.rig, options.surroundings, options.reflector_edge_m, options.reflector_design
-        )
-
-    def image(self, index: int, /) -> np.ndarray:
-        """Render a frame, compressed as JPEG and decoded again: uint8 (h, w, 3), blue first."""
-        import cv2
-
-        stage, options = self._recording.stage, self._recording.options
-        moment_s = float(stage.frame_times.moment_s[index])
-        board = stage.waving.at(moment_s) if stage.waving else None
-        pixels = self._renderer.render(
-            stage.story.at(moment_s),
-            person=options.person,
-            board=board,
-            noise_grey=options.sensor_noise_grey,
-            rng=np.random.default_rng([int(child_rng(options, 11).integers(2**31)), index]),
-        )
-        good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        assert good, "OpenCV encodes every 8-bit picture"
-        return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
+    return SimulatedRecording(stage, placements, clicks_of(stage, placements), first)

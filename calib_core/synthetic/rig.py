@@ -16,6 +16,11 @@ from calib_core.options import option
 NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
 """Optical axes (right, down, forward) in radar axes (forward, left, up): a camera that looks in the radar's direction."""
 
+_OFFSET_SIGMA_M = 0.01
+"""Standard deviation of a true camera centre about the nominal one, per axis."""
+OTHER_OFFSET_M, OTHER_YAW_DEG = (-0.4, 0.9, 0.25), -5.0
+"""Nominal centre of a second camera in the radar frame, and how far to the left it looks of where the radar looks."""
+
 
 @dataclass(frozen=True, slots=True)
 class RigOptions:
@@ -27,7 +32,6 @@ class RigOptions:
     camera_offset_m: tuple[float, float, float] = option(
         (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m]."
     )
-    camera_offset_sigma_m: float = option(0.01, "Standard deviation of the true camera centre about it, per axis [m].")
     camera_angles_deg: tuple[float, float, float] = option(
         (0.0, 0.0, 0.0),
         "Nominal rotation of the camera away from looking where the radar looks: its rotation vector in the camera frame [deg].",
@@ -120,5 +124,5 @@ def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions 
     options = options or RigOptions()
     error_rad = np.deg2rad(options.camera_angle_sigma_deg) * rng.standard_normal(3)
     rotation = rotation_exp(error_rad) @ rotation_exp(np.deg2rad(options.camera_angles_deg)) @ nominal_rotation()
-    centre = np.array(options.camera_offset_m) + options.camera_offset_sigma_m * rng.standard_normal(3)
+    centre = np.array(options.camera_offset_m) + _OFFSET_SIGMA_M * rng.standard_normal(3)
     return Rig(camera, RigidTransform(rotation, -rotation @ centre), radar_stand(options))

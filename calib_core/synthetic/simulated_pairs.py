@@ -55,11 +55,6 @@ class SystematicErrors:
     """The z that a radar without elevation reports for every return, such as its mounting height [m]."""
 
     @property
-    def turns_axes(self) -> bool:
-        """Whether the radar reports in other axes than its own."""
-        return bool(self.azimuth_bias_deg or self.elevation_bias_deg)
-
-    @property
     def turn_of_axes(self) -> RigidTransform:
         """The rotation from the radar's true axes to those in which it reports: that of the angles' biases."""
         azimuth_rad, elevation_rad = np.deg2rad([self.azimuth_bias_deg, self.elevation_bias_deg])
@@ -113,15 +108,16 @@ def draw_systematic_errors(
         angle_biases: draw the biases of the angles too; they are a rotation, so no pair can tell them from the pose.
     """
     radar, lens, reflector = radar or RadarOptions(), lens or LensOptions(), reflector or ReflectorOptions()
-    drawn = rng.standard_normal(15)
+    click_px, offset_m = reflector.click_offset_sigma_px, reflector.offset_sigma_m
+    point_px, drawn = lens.principal_point_sigma_px, rng.standard_normal(15).tolist()
     return SystematicErrors(
         azimuth_scale=radar.azimuth_scale_sigma * drawn[0],
         elevation_scale=radar.elevation_scale_sigma * drawn[1],
         range_bias_m=radar.range_bias_sigma_m * drawn[2],
         range_scale=radar.range_scale_sigma * drawn[3],
-        click_offset_px=_pair(reflector.click_offset_sigma_px * drawn[4:6]),
-        reflector_offset_m=_triple(reflector.offset_sigma_m * drawn[6:9]),
-        principal_point_px=_pair(lens.principal_point_sigma_px * drawn[9:11]),
+        click_offset_px=(click_px * drawn[4], click_px * drawn[5]),
+        reflector_offset_m=(offset_m * drawn[6], offset_m * drawn[7], offset_m * drawn[8]),
+        principal_point_px=(point_px * drawn[9], point_px * drawn[10]),
         focal_length=lens.focal_length_sigma * drawn[11],
         distortion=lens.distortion_sigma * drawn[12],
         azimuth_bias_deg=angle_biases * radar.azimuth_bias_sigma_deg * drawn[13],
@@ -129,16 +125,7 @@ def draw_systematic_errors(
     )
 
 
-def _pair(values: np.ndarray) -> tuple[float, float]:
-    return float(values[0]), float(values[1])
-
-
-def _triple(values: Vector3) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
-
-
 NoiseName = Literal["ti", "ti_fine", "ti_aisle", "imaging", "none"]
-
 
 NOISE_PROFILES: dict[NoiseName, NoiseOptions] = {
     "ti": NoiseOptions(2.0, 0.015, 0.55, 1.0),
@@ -148,18 +135,6 @@ NOISE_PROFILES: dict[NoiseName, NoiseOptions] = {
     "none": NoiseOptions(0.0, 0.0, 0.0, 0.0),
 }
 """Assumed noise of radar families; "none" is exact, and its candidates have the "ti_fine" sigmas."""
-
-
-@dataclass(frozen=True, slots=True)
-class OutlierMix:
-    """The kinds of outliers; the three shares add up to 1."""
-
-    ghost: float = 0.5
-    """Share whose radar position is a reflection: anywhere in the field of view."""
-    misclick: float = 0.25
-    """Share whose click is anywhere in the image."""
-    wrong_pairing: float = 0.25
-    """Share that got the radar position of another placement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,9 +199,7 @@ class SimulatedPairs:
     @property
     def camera_from_radar(self) -> RigidTransform:
         """The true pose of the axes in which the radar reports."""
-        if self.systematic.turns_axes:
-            return self.rig.camera_from_radar @ self.systematic.turn_of_axes.inverse()
-        return self.rig.camera_from_radar
+        return self.rig.camera_from_radar @ self.systematic.turn_of_axes.inverse()
 
 
 def simulate_pairs(
@@ -235,7 +208,6 @@ def simulate_pairs(
     rng: np.random.Generator,
     noise: NoiseOptions | NoiseName = "ti",
     outlier_share: float = 0.0,
-    outlier_mix: OutlierMix | None = None,
     decoys: int = 0,
     layout: PairsLayout = FIELD,
     camera: Camera | None = None,
@@ -245,14 +217,14 @@ def simulate_pairs(
 ) -> SimulatedPairs:
     """Draw a rig and pairs of clicks and radar positions.
 
-    The number of outliers is round(outlier_share * count); which pairs they are is random.
+    The number of outliers is round(outlier_share * count); which pairs they are is random. Half of them are ghosts, a quarter
+    each misclicks and wrong pairings.
 
     Args:
         count: pairs.
         rng: the only source of randomness.
         noise: standard deviations, or the name of a noise profile.
         outlier_share: 0 to 1.
-        outlier_mix: kinds of outliers; None takes half ghosts, a quarter each of misclicks and wrong pairings.
         decoys: additional, wrong candidates per pair. The right one is the most plausible in two pairs out of three.
         layout: where the reflector is put.
         camera: the true intrinsics; None takes 1920 x 1080 with 75 deg and slight barrel distortion.
@@ -271,9 +243,8 @@ def simulate_pairs(
     clicks = aimed + profile.sigma_px * rng.standard_normal(aimed.shape)
     outlier = np.zeros(count, dtype=np.bool_)
     outlier[rng.permutation(count)[: round(outlier_share * count)]] = True
-    mix = outlier_mix or OutlierMix()
     for i in np.flatnonzero(outlier).tolist():
-        _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, reported=reported)
+        _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, reported=reported)
     sigma_polar = sigma_polar_of(profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"])
     pairs, true_candidate = [], []
     for i in range(count):
@@ -281,7 +252,7 @@ def simulate_pairs(
         candidates = _candidates(systematic.without_elevation(positions), sigma_polar)
         pairs.append(Pair(f"p{i + 1}", clicks[i], candidates, sigma_px=max(profile.sigma_px, 0.5)))
         true_candidate.append(-1 if outlier[i] else chosen)
-    in_axes = systematic.turn_of_axes @ points if systematic.turns_axes else points
+    in_axes = systematic.turn_of_axes @ points
     pixels = rig.camera.project(rig.camera_from_radar @ points)
     return SimulatedPairs(rig, tuple(pairs), in_axes, pixels, outlier, tuple(true_candidate), systematic)
 
@@ -323,13 +294,9 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
 
 def _anywhere(rng: np.random.Generator, rig: Rig, layout: PairsLayout) -> Vector3:
     """Draw a position in front of the radar: a wider field than the reflector's, at any height up to 2 m."""
-    wide = PairsLayout(
-        min_range_m=layout.min_range_m,
-        max_range_m=1.3 * layout.max_range_m,
-        max_azimuth_deg=1.3 * layout.max_azimuth_deg,
-    )
-    range_m = rng.uniform(wide.min_range_m, wide.max_range_m)
-    azimuth_rad = np.deg2rad(rng.uniform(-wide.max_azimuth_deg, wide.max_azimuth_deg))
+    range_m = rng.uniform(layout.min_range_m, 1.3 * layout.max_range_m)
+    widest_deg = 1.3 * layout.max_azimuth_deg
+    azimuth_rad = np.deg2rad(rng.uniform(-widest_deg, widest_deg))
     world = np.array([range_m * np.cos(azimuth_rad), range_m * np.sin(azimuth_rad), rng.uniform(0.0, 2.0)])
     return (rig.radar_from_world @ world[None])[0]
 
@@ -342,14 +309,17 @@ def _make_outlier(
     *,
     rig: Rig,
     layout: PairsLayout,
-    mix: OutlierMix,
     reported: Points3,
 ) -> None:
-    """Turn pair i into an outlier, in place; reported: (n, 3) what the radar reports without noise."""
-    kind = rng.uniform(0.0, mix.ghost + mix.misclick + mix.wrong_pairing)
-    if kind < mix.ghost:
+    """Turn pair i into an outlier, in place; reported: (n, 3) what the radar reports without noise.
+
+    A ghost is a reflection anywhere in the field of view, a misclick anywhere in the image, and a wrong pairing has the
+    radar position of another placement.
+    """
+    kind = rng.uniform(0.0, 1.0)
+    if kind < 0.5:
         measured[i] = _anywhere(rng, rig, layout)
-    elif kind < mix.ghost + mix.misclick or len(reported) < 2:
+    elif kind < 0.75 or len(reported) < 2:
         clicks[i] = rng.uniform([0.0, 0.0], [rig.camera.width_px - 1.0, rig.camera.height_px - 1.0])
     else:
         other = int(rng.integers(len(reported) - 1))

@@ -9,6 +9,10 @@ from calib_core.measurements import NS_PER_S
 
 _ISLAND_S = (2.0, 15.0)
 _GAP_S = (60.0, 300.0)
+START_NS = 1_760_000_000 * NS_PER_S
+"""When every recording begins."""
+_JITTER_S, _DROPPED_SHARE = 0.002, 0.01
+"""Standard deviation of a measurement's time [s], and the share of measurements that are lost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,17 +94,18 @@ def draw_islands(rng: np.random.Generator, middles_s: Values) -> Islands:
     return Islands(starts_s, ends_s, np.cumsum(gaps_s - passed_s) - starts_s[0])
 
 
+EVERYTHING = Islands(np.zeros(1), np.full(1, np.inf), np.zeros(1))
+"""The whole story, as it was."""
+
+
 def draw_times(
     rng: np.random.Generator,
-    *,
     duration_s: float,
     rate_hz: float,
-    jitter_s: float,
-    dropped_share: float,
+    *,
     latency_s: float,
     transfer_s: float,
-    start_ns: int,
-    islands: Islands | None = None,
+    islands: Islands = EVERYTHING,
     first_s: float | None = None,
 ) -> SensorTimes:
     """Draw one sensor's times.
@@ -109,24 +114,17 @@ def draw_times(
         rng: the only source of randomness.
         duration_s: length of the recording [s].
         rate_hz: measurements per second.
-        jitter_s: standard deviation of each measurement's time [s].
-        dropped_share: share of measurements that are lost.
-        latency_s: from the measurement to its stamp, clock offset included [s].
+        latency_s: from the measurement to its stamp [s].
         transfer_s: mean delay from the stamp to the recorder [s].
-        start_ns: the recording's start.
-        islands: what of the story is recorded; None for all of it.
+        islands: what of the story is recorded.
         first_s: time of the first measurement [s]; None draws it.
     """
     drawn_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)
     moments = np.arange(drawn_s if first_s is None else first_s, duration_s, 1.0 / rate_hz)
-    jitter = np.clip(jitter_s * rng.standard_normal(len(moments)), -0.3 / rate_hz, 0.3 / rate_hz)
-    moments = (moments + jitter)[rng.uniform(size=len(moments)) >= dropped_share]
-    if islands is None:
-        recorded_s = moments
-    else:
-        moments = moments[islands.recorded(moments)]
-        recorded_s = moments + islands.delay_s(moments)
-    header = start_ns + np.round((recorded_s + latency_s) * NS_PER_S).astype(np.int64)
+    jitter = np.clip(_JITTER_S * rng.standard_normal(len(moments)), -0.3 / rate_hz, 0.3 / rate_hz)
+    moments = (moments + jitter)[rng.uniform(size=len(moments)) >= _DROPPED_SHARE]
+    moments = moments[islands.recorded(moments)]
+    header = START_NS + np.round((moments + islands.delay_s(moments) + latency_s) * NS_PER_S).astype(np.int64)
     delay_s = transfer_s * rng.gamma(4.0, 0.25, len(moments))
     receive = np.maximum.accumulate(header + np.round(delay_s * NS_PER_S).astype(np.int64))
     return SensorTimes(moments, header, receive + np.arange(len(moments)))

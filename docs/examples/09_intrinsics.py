@@ -3,16 +3,19 @@
 import numpy as np
 
 import cocalib as cc
-from calib_core.intrinsics import Board, BoardSearch, calibrate_lens
+from calib_core.intrinsics import Board, BoardCorners, BoardSearch, calibrate_lens
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import simulated_views, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 # From pictures, `cocalib intrinsics left*.jpg --board 9x6 --square-mm 25 --out camera.yaml` finds the corners first; in Python
 # calib_core.intrinsics.search_boards does. Here the corners are simulated, so the true lens is known.
 rng = np.random.default_rng(5)
 board, truth = Board("checkerboard", 9, 6, 0.025), typical_camera("plumb_bob", width_px=1280, height_px=720)
-views = simulated_views(rng, board, truth, waved_poses(rng, board, truth, 30))
-search = BoardSearch(board, (truth.width_px, truth.height_px), views, (), len(views))
+size_px, ids, views = (truth.width_px, truth.height_px), np.arange(len(board.corners_m)), []
+for index, pose in enumerate(waved_poses(rng, board, truth, 30)):
+    pixels_px = truth.project(pose @ board.corners_m) + 0.1 * rng.standard_normal((len(ids), 2))
+    views.append(BoardCorners(index, f"view {index + 1}", None, size_px, ids, pixels_px))
+search = BoardSearch(board, size_px, tuple(views), (), len(views))
 
 lens = calibrate_lens(search, "plumb_bob")  # "auto" tries the models and takes the simplest that predicts as well
 if isinstance(lens, cc.Unsolvable):

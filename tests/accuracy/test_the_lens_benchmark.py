@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.intrinsics.bad_views import planted
-from benchmarks.intrinsics.coverage import CASES, drawn_search
+from benchmarks.intrinsics.coverage import CASES, CornerErrors, drawn_search
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, LENSES, changed_light, drawn_camera, drawn_series, moved
 from benchmarks.intrinsics.rendered import measured, scaled_errors
 from benchmarks.intrinsics.tables import Table
@@ -61,3 +61,20 @@ def test_a_table_is_written_in_markdown():
     text = Table("Speed", ("frames", "time"), (("300", "9 s"),), "On one machine.").text
     assert text == "## Speed\n\nOn one machine.\n\n| frames | time |\n|---|---|\n| 300 | 9 s |\n"
     assert CHECKERBOARD.columns == 9
+
+
+def test_corner_errors_are_as_large_as_asked_for():
+    rng, grid = np.random.default_rng(2), np.stack(np.meshgrid(np.arange(9) * 40.0, np.arange(6) * 40.0), axis=-1)
+    true = grid.reshape(-1, 2)
+
+    def errors(asked: CornerErrors) -> np.ndarray:
+        return np.array([asked.drawn(rng, true) for _ in range(60)])
+
+    independent = errors(CornerErrors())
+    assert independent.std() == pytest.approx(0.1, rel=0.05)
+    assert abs(np.mean(independent[:, 1:] * independent[:, :-1])) < 0.001
+    shared = errors(CornerErrors(0.0, shared_px=0.1))
+    assert shared.std() == pytest.approx(0.1, rel=0.2)
+    assert np.mean(shared[:, 1:9] * shared[:, :8]) > 0.85 * np.mean(np.square(shared))
+    gross = errors(CornerErrors(0.0, gross_share=0.05))
+    assert np.mean(np.linalg.norm(gross, axis=2) > 0.5) == pytest.approx(0.05, abs=0.015)

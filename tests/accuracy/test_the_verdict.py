@@ -7,7 +7,7 @@ from scipy.special import bdtrc
 from benchmarks.accuracy.verdicts import Verdicts, measure_verdict, share_inside
 from calib_core.calibration import calibrate
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import PRESETS, simulate_scans
+from calib_core.synthetic import PRESETS, simulate
 from calib_core.synthetic.sample import SAMPLE_OPTIONS
 from cocalib.session import Session
 from cocalib.view.build import verdict_row
@@ -32,7 +32,7 @@ def test_nineteen_in_twenty_good_and_usable_calibrations_are_as_near_the_truth_a
 @pytest.mark.parametrize("options", [SAMPLE_OPTIONS, PRESETS["default"], PRESETS["fine"], PRESETS["paper-d1"]])
 def test_right_clicks_in_any_order_show_no_red(options):
     """Neither below the pairs that the verdict needs, nor soon after: no contradiction, and no pair that disagrees."""
-    simulated = simulate_scans(options)
+    simulated = simulate(options)
     rng = np.random.default_rng(1)
     for _ in range(20):
         order = rng.permutation(len(simulated.clicks))

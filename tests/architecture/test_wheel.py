@@ -18,9 +18,10 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.boards import render_board
 from calib_core.intrinsics import Board
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import render_board, waved_poses
+from calib_core.synthetic.boards import waved_poses
 from tests.architecture.test_named_commands import command_lines
 from tests.port_client import channel, come_in, wanted
 from tests.served_process import ServedProcess
@@ -242,7 +243,7 @@ def run_line(cocalib: Path, folder: Path, line: str) -> tuple[int, str]:
     elif line.startswith("cocalib simulate"):
         shutil.rmtree(folder / "somewhere", ignore_errors=True)
         small = _SMALL if "--out ." in line else f"{_SMALL} placements=4"
-        line = " ".join([line.replace("duration_s=14", "duration_s=9"), *(f"--set {each}" for each in small.split())])
+        line = " ".join([line.replace("board_s=14", "board_s=9"), *(f"--set {each}" for each in small.split())])
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     process = subprocess.Popen(
         [cocalib, *shlex.split(line)[1:]],

@@ -15,7 +15,7 @@ from playwright.sync_api import expect
 from calib_core.interchange import read_camera_file
 from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
-from calib_core.synthetic import PRESETS, WavedBoard, simulate, write_recording
+from calib_core.synthetic import PRESETS, simulate, write_recording
 from cocalib.intrinsics import RecordedPictures
 from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace
@@ -33,7 +33,7 @@ OPTIONS = replace(
     height_px=250,
     camera_rate_hz=2.0,
     radar_rate_hz=8.0,
-    waved_board=WavedBoard(duration_s=12.0),
+    waved_board_s=12.0,
 )
 HELD_FROM = 16
 """The search waits at this picture until the test has cancelled it."""

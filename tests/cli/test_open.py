@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import Recording
-from calib_core.synthetic import OtherCamera, SimulationOptions, simulate, write_recording
+from calib_core.synthetic import SimulationOptions, simulate, write_recording
 from cocalib.cli import run
 from cocalib.workspace import Workspace
 from tests.picture_recording import grey_frames
@@ -70,7 +70,7 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path, capsys):
 def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(served, tmp_path, cocalib):
     size = {"placements": 4, "dwell_s": 4.0, "width_px": 128, "height_px": 80, "camera_rate_hz": 1.0}
     with grey_frames():
-        write_recording(simulate(SimulationOptions(**size, other_camera=OtherCamera(present=True))), tmp_path)
+        write_recording(simulate(SimulationOptions(**size, other_camera=True)), tmp_path)
     for camera, name in (("camera", "clicks.json"), ("camera_2", "clicks_2.json")):
         given = ("--image-topic", f"/{camera}/image_raw/compressed", "--clicks", tmp_path / name, "--no-browser")
         session = ("--session", tmp_path / camera)

@@ -13,17 +13,17 @@ from benchmarks.paper.judgement import PAPER, Judged, differing, judged, row_jud
 from benchmarks.paper.page import MEASURED_FILE, page, read_measured
 from benchmarks.paper.rows import Figures, Seed, calibrated, displaced, measured_pairs, with_gross_errors
 from benchmarks.paper.settings import FIT_SEEDS, FITTED, PPM, SEED_SETS, Dataset, options_of, other_rig, session
-from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
+from calib_core.synthetic import SimulatedRecording, simulate, write_recording
 from cocalib.cli import run as cocalib
 
 SMALL = dataclasses.replace(FITTED, width_px=480, placements=5, board_corners=5)
 
 
-def recorded(dataset: Dataset, folder: Path) -> SimulatedScans:
-    """Write a data set as bags and clicks; return its scans alone."""
-    options = dataclasses.replace(options_of(dataset, 1, SMALL), camera_rate_hz=1.0)
-    write_recording(simulate(options), folder)
-    return simulate_scans(options)
+def recorded(dataset: Dataset, folder: Path) -> SimulatedRecording:
+    """Write a data set as bags and clicks, and return it."""
+    recording = simulate(dataclasses.replace(options_of(dataset, 1, SMALL), camera_rate_hz=1.0))
+    write_recording(recording, folder)
+    return recording
 
 
 def solved(folder: Path, camera: str = "camera") -> dict[str, float]:
@@ -36,7 +36,7 @@ def solved(folder: Path, camera: str = "camera") -> dict[str, float]:
     return json.loads(out.read_text())["metrics"]
 
 
-def agrees(folder: Path, simulated: SimulatedScans, camera: str = "camera") -> None:
+def agrees(folder: Path, simulated: SimulatedRecording, camera: str = "camera") -> None:
     alone = calibrated(simulated).unwrap()
     found = solved(folder, camera)
     assert found["n"] == alone.metrics.n == 5

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.paper.rows import Figures, by_checkerboard, calibrated, figures_of, measure, points_and_pixels
 from benchmarks.paper.settings import FITTED, SEED_SETS, Dataset, session
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedScans
+from calib_core.synthetic import SimulatedRecording
 
 Point = Sequence[float]
 
@@ -66,7 +66,7 @@ def solved(system: list[list[float]]) -> list[float]:
     return found
 
 
-def solved_set(dataset: Dataset) -> tuple[SimulatedScans, Calibration]:
+def solved_set(dataset: Dataset) -> tuple[SimulatedRecording, Calibration]:
     simulated = session(dataset, SEED_SETS[0][0], FITTED)
     return simulated, calibrated(simulated).unwrap()
 
@@ -77,7 +77,7 @@ def d1() -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def d2() -> tuple[SimulatedScans, Calibration]:
+def d2() -> tuple[SimulatedRecording, Calibration]:
     return solved_set("d2")
 
 

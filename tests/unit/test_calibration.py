@@ -9,9 +9,8 @@ from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.measurements import MIN_PAIRS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.synthetic import SimulatedPairs, simulate, simulate_pairs
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.scans import simulate_scans
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
@@ -118,7 +117,7 @@ def test_clicks_unrelated_to_the_radar_are_unsolvable():
 
 @pytest.mark.slow
 def test_a_whole_simulated_session_is_solved_within_its_uncertainty():
-    session = simulate_scans(SimulationOptions(placements=12, seed=4))
+    session = simulate(SimulationOptions(placements=12, seed=4))
     options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))
     outcome = calibrate(session.clicks, session.scans, session.camera, options).unwrap()
     truth = session.stage.rig.camera_from_radar

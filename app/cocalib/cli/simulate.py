@@ -7,7 +7,8 @@ from typing import Annotated
 import tyro
 
 from calib_core.errors import InputError
-from calib_core.synthetic import PRESETS, Container, PresetName, SimulationOptions
+from calib_core.synthetic import PRESETS, PresetName, SimulationOptions
+from calib_core.synthetic.options import Container
 from cocalib.cli.flags import File
 from cocalib.cli.named_options import Settings, with_named
 from cocalib.cli.output import progress_bar

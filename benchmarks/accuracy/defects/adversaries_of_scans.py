@@ -8,7 +8,7 @@ from benchmarks.accuracy.scenes import Scene, draw_windows
 from calib_core.calibration import calibrate
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.synthetic import SimulationOptions, simulate_scans
+from calib_core.synthetic import SimulationOptions, simulate
 
 __all__ = ["ADVERSARIES_OF_SCANS"]
 
@@ -47,7 +47,7 @@ def _second(click: ReflectorClick, right_px: float, down_px: float) -> Reflector
 def _heavy_aisle(trial: int) -> Solved:
     """Solve a simulated session in a cluttered aisle with its own clicks."""
     options = SimulationOptions(seed=_FIRST_SEED + trial, scene="aisle", clutter="heavy", radar_rate_hz=_RATE_HZ)
-    simulated = simulate_scans(options)
+    simulated = simulate(options)
     return Solved(
         calibrate(simulated.clicks, simulated.scans, simulated.camera, CalibrationOptions()),
         simulated.camera_from_radar,

@@ -12,14 +12,15 @@ from benchmarks.accuracy.figures import at_least, column, fewest, share, summed_
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.association.placements import find_placements
 from calib_core.calibration import calibrate
-from calib_core.measurements import RadarScan, RadarScans
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.containers.writing import write_ros1_bag
+from calib_core.recordings.containers.writing import RecordedMessage, write_ros1_bag
+from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedRecording, SimulationOptions, Surroundings, simulate
-from calib_core.synthetic.files import CLOUD_TOPIC, radar_messages
+from calib_core.synthetic.files import CLOUD_TOPIC, TRANSFER_NS, cloud_message, radar_messages
 from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.radar_returns import Antenna
 from calib_core.synthetic.scans import with_wrong_azimuths
@@ -44,12 +45,12 @@ _FAR_TOPIC = f"{CLOUD_TOPIC}_far"
 def measure_topics(case: str, trial: int) -> Figures:
     """Write one recording as several topics and as one ideal topic, open both, and solve the same clicks."""
     options = replace(CASES[case], seed=_FIRST_SEED + trial)
-    ideal = _measured_once(simulate(replace(options, defects=replace(options.defects, ideal_topic=True))))
+    ideal = _measured_once(simulate(replace(options, defects=replace(options.defects, second_azimuth="none"))))
     simulated = _with_wrong_azimuths(ideal, simulate(options))
     figures: Figures = {"placements": float(len(simulated.placements))}
     with tempfile.TemporaryDirectory() as folder:
         several = write_ros1_bag(Path(folder) / "several.bag", radar_messages(simulated, 1))
-        one = write_ros1_bag(Path(folder) / "one.bag", radar_messages(ideal, 1))
+        one = write_ros1_bag(Path(folder) / "one.bag", _in_one_topic(ideal))
         for name, path, topic in (("merged", several, None), ("single", several, _FAR_TOPIC), ("ideal", one, None)):
             with open_recording(path, RecordingOptions(radar_topic=topic), require=("radar",)) as recording:
                 scans = recording.radar_scans()
@@ -58,7 +59,7 @@ def measure_topics(case: str, trial: int) -> Figures:
     return figures
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Measured(SimulatedRecording):
     """A simulated recording whose scans are kept, so that they are drawn once.
 
@@ -75,7 +76,7 @@ class _Measured(SimulatedRecording):
 
 def _measured_once(recording: SimulatedRecording) -> _Measured:
     kept = {antenna.name: tuple(recording.scans_of(antenna)) for antenna in recording.stage.antennas}
-    return _Measured(recording.stage, recording.placements, recording.clicked, kept)
+    return _Measured(recording.stage, recording.placements, recording.clicked, kept=kept)
 
 
 def _with_wrong_azimuths(ideal: _Measured, several: SimulatedRecording) -> _Measured:
@@ -83,7 +84,18 @@ def _with_wrong_azimuths(ideal: _Measured, several: SimulatedRecording) -> _Meas
     kept = {
         name: tuple(with_wrong_azimuths(several.stage, scan) for scan in scans) for name, scans in ideal.kept.items()
     }
-    return _Measured(several.stage, several.placements, several.clicked, kept)
+    return _Measured(several.stage, several.placements, several.clicked, kept=kept)
+
+
+def _in_one_topic(ideal: _Measured) -> Iterator[RecordedMessage]:
+    """Put the returns that all antennas report in one moment into one cloud; none is left out."""
+    parts = [RadarScans.from_scans(list(scans)) for scans in ideal.kept.values()]
+    moments = moments_of([part.times_ns for part in parts])
+    together = [aligned(part, own, moments.times_ns) for part, own in zip(parts, moments.scan_of, strict=True)]
+    scans = merged(together, [Spread(np.full(3, 1e-9), 1e-9)] * len(parts), list(range(len(parts))))
+    for number in range(len(scans)):
+        scan = scans.scan(number)
+        yield cloud_message(CLOUD_TOPIC, scan, TimeNs(scan.time + TRANSFER_NS))
 
 
 def _measured(simulated: SimulatedRecording, scans: RadarScans) -> Figures:

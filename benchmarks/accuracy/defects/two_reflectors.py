@@ -17,7 +17,7 @@ from calib_core.radar import direction_cosines
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import write_ros1_bag
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate, simulate_scans
+from calib_core.synthetic import simulate
 from calib_core.synthetic.files import radar_messages
 from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.scene.stage import SimulatedPlacement
@@ -33,7 +33,7 @@ _FOUND, _WRONG = 90.0, 20.0  # percent
 
 def measure_two(preset: PresetName, trial: int) -> Figures:
     """Look for the placements in the scans of one simulated recording."""
-    simulated = simulate_scans(replace(PRESETS[preset], seed=_FIRST_SEED + trial))
+    simulated = simulate(replace(PRESETS[preset], seed=_FIRST_SEED + trial))
     found = find_placements(simulated.scans, GatingOptions())
     places = [_nearest(one, simulated.placements) for one in found]
     return {

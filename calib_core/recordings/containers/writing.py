@@ -1,6 +1,5 @@
 """Build ROS messages from values, with rosbags, and write them as bags: for simulated recordings, exports and tests."""
 
-import dataclasses
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,6 @@ from calib_core.errors import RecordingError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.lens_models.registry import written_lens
 from calib_core.measurements import TimeNs, time_parts
-from calib_core.radar import cartesian_from_polar
 from calib_core.recordings.containers.sources import ChannelNotes, StoredChannel
 
 Ros1Compression = Literal["none", "bz2", "lz4"]
@@ -32,33 +30,8 @@ uint16 doppler_bin
 float32 bearing
 float32 intensity
 """
-VENDOR_SCAN_TYPE = "acme_radar_msgs/msg/AcmeDataPacket"
-VENDOR_SCAN_DEFINITION = """\
-Header header
-uint32 u_packet_counter
-uint16 u_num_detections
-AcmeDetection[] s_detections
-"""
-VENDOR_DETECTION_TYPE = "acme_radar_msgs/msg/AcmeDetection"
-VENDOR_DETECTION_DEFINITION = """\
-uint16 u_index
-float32 f_range            # [m]
-float32 f_range_rate       # [m/s] positive moving away
-float32 f_azimuth_angle    # [deg] positive to the left
-float32 f_elevation_angle  # [deg] positive upwards
-float32 f_rcs              # [dBsm]
-float32 f_range_var        # [m^2]
-float32 f_pos_x            # [m] forward
-float32 f_pos_y            # [m] left
-float32 f_pos_z            # [m] up
-"""
 TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
 TRANSFORMS_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
-_DEFINITIONS = {
-    RADAR_SCAN_TYPE: RADAR_SCAN_DEFINITION,
-    VENDOR_DETECTION_TYPE: VENDOR_DETECTION_DEFINITION,
-    VENDOR_SCAN_TYPE: VENDOR_SCAN_DEFINITION,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +42,6 @@ class CompressedImageMessage:
     frame_id: str
     data: bytes
     format: str = "jpeg"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ImageMessage:
-    """A sensor_msgs/Image of encoding bgr8: pixels are (h, w, 3) uint8, blue first."""
-
-    stamp: TimeNs
-    frame_id: str
-    pixels: np.ndarray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen_array(self.pixels, (None, None, 3), dtype=np.uint8))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +77,7 @@ class RadarReturnMessage:
         x_m: forward.
         y_m: left.
         z_m: up.
-        range_m: 0 in the stock driver, which never sets it; likewise doppler_bin, bearing and intensity.
+        range_m: the slant range.
         velocity_mps: positive moving away.
         doppler_bin: 0 to the number of bins minus 1; zero speed is at half the number of bins.
         bearing_deg: positive to the left.
@@ -137,31 +98,6 @@ class RadarReturnMessage:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VendorScanMessage:
-    """A scan in a vendor's own message: a packet with an array of structs, whose fields have prefixes.
-
-    Attributes:
-        stamp: of the scan.
-        frame_id: of the radar.
-        polar: (n, 3) range [m], azimuth to the left and elevation upwards [rad].
-        doppler_mps: (n,) positive moving away.
-        rcs_dbsm: (n,).
-    """
-
-    stamp: TimeNs
-    frame_id: str
-    polar: np.ndarray
-    doppler_mps: np.ndarray
-    rcs_dbsm: np.ndarray
-
-    def __post_init__(self) -> None:
-        count = len(self.polar)
-        object.__setattr__(self, "polar", frozen_array(self.polar, (count, 3)))
-        for name in ("doppler_mps", "rcs_dbsm"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class TransformMessage:
     """A tf2_msgs/TFMessage of one transform.
 
@@ -179,13 +115,7 @@ class TransformMessage:
 
 
 MessageBody: TypeAlias = (
-    CompressedImageMessage
-    | ImageMessage
-    | CameraInfoMessage
-    | CloudMessage
-    | RadarReturnMessage
-    | TransformMessage
-    | VendorScanMessage
+    CompressedImageMessage | CameraInfoMessage | CloudMessage | RadarReturnMessage | TransformMessage
 )
 
 
@@ -272,12 +202,10 @@ def _write_all(
 
 MESSAGE_TYPES: dict[type, str] = {
     CompressedImageMessage: "sensor_msgs/msg/CompressedImage",
-    ImageMessage: "sensor_msgs/msg/Image",
     CameraInfoMessage: "sensor_msgs/msg/CameraInfo",
     CloudMessage: "sensor_msgs/msg/PointCloud2",
     RadarReturnMessage: RADAR_SCAN_TYPE,
     TransformMessage: TRANSFORMS_TYPE,
-    VendorScanMessage: VENDOR_SCAN_TYPE,
 }
 
 
@@ -289,9 +217,9 @@ class MessageBuilder:
 
         self.generation = generation
         self.typestore: Any = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
-        for kind, definition in _DEFINITIONS.items():
-            spelt = definition if generation == 1 else definition.replace("Header header", "std_msgs/Header header", 1)
-            self.typestore.register(get_types_from_msg(spelt, kind))
+        header = "Header header" if generation == 1 else "std_msgs/Header header"
+        definition = RADAR_SCAN_DEFINITION.replace("Header header", header, 1)
+        self.typestore.register(get_types_from_msg(definition, RADAR_SCAN_TYPE))
         if TRANSFORMS_TYPE not in self.typestore.types:  # as in the store of ROS 1
             self.typestore.register(get_types_from_msg(TRANSFORMS_DEFINITION, TRANSFORMS_TYPE))
         self.sequence: dict[type, int] = {}
@@ -328,14 +256,10 @@ class MessageBuilder:
         """Build the ROS message for a value."""
         if isinstance(body, RadarReturnMessage):
             return self._radar_return(body)
-        if isinstance(body, VendorScanMessage):
-            return self._vendor_scan(body)
         if isinstance(body, CloudMessage):
             return self._cloud(body)
         if isinstance(body, CameraInfoMessage):
             return self._camera_info(body)
-        if isinstance(body, ImageMessage):
-            return self._image(body)
         if isinstance(body, TransformMessage):
             return self._transform(body)
         data = np.frombuffer(body.data, dtype=np.uint8)
@@ -382,21 +306,6 @@ class MessageBuilder:
             intensity=body.intensity_db,
         )
 
-    def _vendor_scan(self, body: VendorScanMessage) -> Any:
-        detection = self.typestore.types[VENDOR_DETECTION_TYPE]
-        names = [field.name for field in dataclasses.fields(detection) if not field.name.startswith("__")]
-        degrees = np.rad2deg(body.polar[:, 1:])
-        rest = (np.full(len(body.polar), 1e-3), *cartesian_from_polar(body.polar).T)
-        columns = (body.polar[:, 0], body.doppler_mps, *degrees.T, body.rcs_dbsm, *rest)
-        rows = [
-            detection(**dict(zip(names, (number, *row), strict=True)))
-            for number, row in enumerate(np.column_stack(columns).tolist())
-        ]
-        count = self.sequence.get(type(body), 0)
-        return self._new(
-            body, header=self._header(body), u_packet_counter=count, u_num_detections=len(rows), s_detections=rows
-        )
-
     def _cloud(self, body: CloudMessage) -> Any:
         field = self.typestore.types["sensor_msgs/msg/PointField"]
         count, width = body.values.shape
@@ -411,19 +320,6 @@ class MessageBuilder:
             row_step=4 * width * count,
             data=np.frombuffer(body.values.astype("<f4").tobytes(), dtype=np.uint8),
             is_dense=True,
-        )
-
-    def _image(self, body: ImageMessage) -> Any:
-        height, width = body.pixels.shape[:2]
-        return self._new(
-            body,
-            header=self._header(body),
-            height=height,
-            width=width,
-            encoding="bgr8",
-            is_bigendian=0,
-            step=3 * width,
-            data=body.pixels.reshape(-1),
         )
 
     def _camera_info(self, body: CameraInfoMessage) -> Any:

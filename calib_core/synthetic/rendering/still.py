@@ -5,29 +5,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Vector3
+from calib_core.arrays import Points2, Vector3
+from calib_core.camera import Camera
 from calib_core.synthetic.rendering.surfaces import (
-    Hits,
+    GROUNDS,
     Patch,
     Solid,
     block,
     display,
     fractal_noise,
-    ground_colour,
     hash_random,
     lit,
     shadowed,
-    sun_direction,
     trace,
     value_noise,
 )
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.scenes import Backdrop, Scene
 
+_FAR_PX = 1e6
 _GRID_PX = 4
 _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012
-_LENS_BLUR_PX = 0.5
+LENS_BLUR_PX = 0.5
 """Standard deviation of the lens blur of the backdrop."""
 _FAR_M = {"tiles": 22.3, "grass": 400.0, "floor": 22.0, "asphalt": 12.0, "yard": 400.0, "road": 400.0}
 
@@ -49,6 +49,27 @@ class Still:
     ground: np.ndarray
     rays: np.ndarray
     eye_m: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A rectangle of the picture, given by its row and column slices."""
+
+    rows: slice
+    columns: slice
+
+    @classmethod
+    def around(cls, pixels_px: Points2, camera: Camera, margin_px: float = 2.0) -> "Window | None":
+        """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
+        if not np.all(np.isfinite(pixels_px)):
+            return None
+        bounded = np.clip(pixels_px, -_FAR_PX, _FAR_PX)  # next to the plane of the lens, pixels are beyond any integer
+        low = np.floor(bounded.min(axis=0) - margin_px).astype(int)
+        high = np.ceil(bounded.max(axis=0) + margin_px + 1).astype(int)
+        low, high = np.maximum(low, 0), np.minimum(high, [camera.width_px, camera.height_px])
+        if np.any(high <= low):
+            return None
+        return cls(slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0])))
 
 
 def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
@@ -74,7 +95,7 @@ def trace_still(scene: Scene, rig: Rig) -> Still:
 
     eye = rig.camera_position_world_m
     solids = [block(item) for item in scene.solids]
-    sun = sun_direction(scene)
+    sun = scene.towards_sun
     across = np.cross(sun, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     upward = np.cross(across, sun)
@@ -83,28 +104,25 @@ def trace_still(scene: Scene, rig: Rig) -> Still:
         turn = np.pi / 4.0 + number * np.pi / 2.0
         towards = sun + _SUN_RADIUS * (np.cos(turn) * across + np.sin(turn) * upward)
         rays = pixel_rays(rig, du, dv)
-        colour, _ = _shade(scene, rig, solids, eye, rays, towards / np.linalg.norm(towards))
-        total += display(colour)
+        total += display(_shade(scene, rig, solids, rays, towards / np.linalg.norm(towards)))
     rays = pixel_rays(rig)
-    hits = trace(solids, eye, rays.reshape(-1, 3), rig, far_m=_FAR_M[scene.ground], ceiling_m=scene.ceiling_m)
+    hits = trace(solids, rays.reshape(-1, 3), rig, far_m=_FAR_M[scene.ground], ceiling_m=scene.ceiling_m)
     shape = rays.shape[:2]
-    levels = cv2.GaussianBlur(total / np.float32(len(_SAMPLES)), (0, 0), _LENS_BLUR_PX)
+    levels = cv2.GaussianBlur(total / np.float32(len(_SAMPLES)), (0, 0), LENS_BLUR_PX)
     return Still(levels, hits.depth_m.reshape(shape), (hits.solid == -1).reshape(shape), rays, eye)
 
 
-def _shade(
-    scene: Scene, rig: Rig, solids: list[Solid], eye: Vector3, rays: np.ndarray, towards: Vector3
-) -> tuple[np.ndarray, Hits]:
+def _shade(scene: Scene, rig: Rig, solids: list[Solid], rays: np.ndarray, towards: Vector3) -> np.ndarray:
     """Return linear colours (h, w, 3) of what the rays hit."""
-    flat = rays.reshape(-1, 3)
+    flat, eye = rays.reshape(-1, 3), rig.camera_position_world_m.astype(np.float32)
     pixel_rad = 1.0 / float(rig.camera.matrix_px[0, 0])
-    hits = trace(solids, eye, flat, rig, far_m=_FAR_M[scene.ground], ceiling_m=scene.ceiling_m)
+    hits = trace(solids, flat, rig, far_m=_FAR_M[scene.ground], ceiling_m=scene.ceiling_m)
     colour = np.empty_like(flat)
     away = hits.solid == -3
-    colour[away] = backdrop_colour(scene.backdrop, flat[away], pixel_rad)
+    colour[away] = _BACKDROPS[scene.backdrop](flat[away].astype(np.float32), pixel_rad)
     for number in np.unique(hits.solid[~away]).tolist():
         rows = np.flatnonzero(hits.solid == number)
-        points = eye.astype(np.float32) + hits.depth_m[rows, None] * flat[rows]
+        points = eye + hits.depth_m[rows, None] * flat[rows]
         normals = hits.normal[rows]
         slant = np.maximum(np.abs(np.sum(normals * flat[rows], axis=1)), 0.06)
         footprint = (hits.depth_m[rows] * pixel_rad / np.sqrt(slant)).astype(np.float32)
@@ -116,14 +134,14 @@ def _shade(
         haze = 1.0 - np.exp(-hits.depth_m[rows] / (900.0 if scene.ceiling_m == 0.0 else 1e9))
         shaded = albedo * light
         colour[rows] = shaded + (HAZE - shaded) * haze[:, None]
-    return colour.reshape(rays.shape), hits
+    return colour.reshape(rays.shape)
 
 
 def _albedo(
     scene: Scene, solids: list[Solid], number: int, points: np.ndarray, normals: np.ndarray, footprint: np.ndarray
 ) -> np.ndarray:
     if number == -1:
-        return ground_colour(scene.ground, Patch(points[:, 0], points[:, 1], 1e3, 1e3, footprint, 1))
+        return GROUNDS[scene.ground](Patch(points[:, 0], points[:, 1], 1e3, 1e3, footprint, 1))
     if number == -2:
         return np.broadcast_to(np.array([0.62, 0.62, 0.60], dtype=np.float32), points.shape).copy()
     return solids[number].colour(points, normals, footprint)
@@ -147,17 +165,6 @@ def _openness(scene: Scene, solids: list[Solid], number: int, points: np.ndarray
 
 HAZE = np.array([0.66, 0.75, 0.84], dtype=np.float32)
 _ZENITH = np.array([0.085, 0.22, 0.60], dtype=np.float32)
-
-
-def backdrop_colour(backdrop: Backdrop, directions: np.ndarray, footprint_rad: float) -> np.ndarray:
-    """Return colours (n, 3) of the distant backdrop.
-
-    Args:
-        backdrop: which backdrop.
-        directions: (n, 3) unit vectors in the world.
-        footprint_rad: size of a pixel.
-    """
-    return _BACKDROPS[backdrop](directions.astype(np.float32), footprint_rad)
 
 
 def _sky(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
@@ -260,3 +267,4 @@ def _hall(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
 
 
 _BACKDROPS: dict[Backdrop, Callable[[np.ndarray, float], np.ndarray]] = {"city": _city, "trees": _trees, "hall": _hall}
+"""Colours (n, 3) of the distance, by directions (n, 3) in the world and the size of a pixel [rad]."""

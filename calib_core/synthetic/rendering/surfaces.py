@@ -45,6 +45,10 @@ class Patch:
             seed=self.seed * 31 + salt,
         )
 
+    def lines(self, position_m: np.ndarray, period_m: float, width_m: float, blur: float = 1.0) -> np.ndarray:
+        """Return the share of each pixel that repeating lines cover, across a position."""
+        return line_coverage(position_m, period_m=period_m, width_m=width_m, footprint_m=blur * self.footprint_m)
+
     def plain(self, *rgb: float) -> np.ndarray:
         """Return one colour for all points: (n, 3)."""
         return np.broadcast_to(np.array(rgb, dtype=np.float32), (len(self.u_m), 3)).copy()
@@ -57,6 +61,10 @@ class Patch:
         return np.clip((width_m - inset) / np.maximum(self.footprint_m, 1e-4) + 0.5, 0.0, 1.0)
 
 
+def _tinted(level: np.ndarray, *rgb: float) -> np.ndarray:
+    return np.asarray(level[:, None] * np.array(rgb, dtype=np.float32))
+
+
 def _mixed(low: np.ndarray, high: np.ndarray | tuple[float, ...], share: np.ndarray) -> np.ndarray:
     return low + (np.asarray(high, dtype=np.float32) - low) * share[:, None]
 
@@ -65,10 +73,7 @@ def _tiles(p: Patch) -> np.ndarray:
     size = 0.6
     tone = cell_random(p.u_m / size + 0.5, p.v_m / size + 0.5, 5)
     warm = cell_random(p.u_m / size + 0.5, p.v_m / size + 0.5, 6)
-    joint = np.maximum(
-        line_coverage(p.u_m + size / 2, period_m=size, width_m=0.012, footprint_m=p.footprint_m),
-        line_coverage(p.v_m + size / 2, period_m=size, width_m=0.012, footprint_m=3.0 * p.footprint_m),
-    )
+    joint = np.maximum(p.lines(p.u_m + size / 2, size, 0.012), p.lines(p.v_m + size / 2, size, 0.012, blur=3.0))
     stain = np.clip(p.noise(2.6, 4, 1), -1.0, 1.0)
     level = 0.40 * (1.0 + 0.13 * (tone - 0.5) + 0.10 * stain)
     colour = level[:, None] * (
@@ -84,8 +89,7 @@ def _grass(p: Patch) -> np.ndarray:
     blades = p.noise(0.10, 3, 2, stretch=2.0)
     level = 0.17 * (1.0 + 0.07 * stripe * soft + 0.14 * patchy + 0.16 * blades)
     dry = np.clip(0.35 * p.noise(1.4, 3, 3) + 0.12, 0.0, 0.5)
-    colour = level[:, None] * np.array([0.62, 1.0, 0.30], dtype=np.float32)
-    colour = _mixed(colour, (0.24, 0.22, 0.10), dry)
+    colour = _mixed(_tinted(level, 0.62, 1.0, 0.30), (0.24, 0.22, 0.10), dry)
     near = p.footprint_m
     line = np.clip((0.06 - np.abs(p.u_m - 19.0)) / near + 0.5, 0.0, 1.0)
     box = (np.abs(p.v_m) < 9.16) * np.clip((0.06 - np.abs(p.u_m - 13.5)) / near + 0.5, 0.0, 1.0)
@@ -96,45 +100,43 @@ def _grass(p: Patch) -> np.ndarray:
 
 def _floor(p: Patch) -> np.ndarray:
     level = 0.30 * (1.0 + 0.10 * p.noise(1.7, 4, 1) + 0.03 * p.noise(0.06, 2, 2))
-    colour = level[:, None] * np.array([0.98, 0.99, 1.0], dtype=np.float32)
-    seam = line_coverage(p.u_m - 1.0, period_m=4.0, width_m=0.012, footprint_m=4.0 * p.footprint_m)
-    colour = _mixed(colour, (0.10, 0.10, 0.10), seam)
+    seam = p.lines(p.u_m - 1.0, 4.0, 0.012, blur=4.0)
+    colour = _mixed(_tinted(level, 0.98, 0.99, 1.0), (0.10, 0.10, 0.10), seam)
     paint = np.clip((0.05 - np.abs(np.abs(p.v_m) - 1.40)) / p.footprint_m + 0.5, 0.0, 1.0)
     worn = np.clip(0.85 + 0.5 * p.noise(0.25, 3, 3), 0.3, 1.0)
     return _mixed(colour, (0.78, 0.55, 0.05), paint * worn)
 
 
+def _tar(p: Patch, level: float, stains: float = 0.13, size_m: float = 2.2) -> np.ndarray:
+    rough = level * (1.0 + stains * p.noise(size_m, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
+    return _tinted(rough, 1.0, 0.99, 0.97)
+
+
 def _asphalt(p: Patch) -> np.ndarray:
-    level = 0.155 * (1.0 + 0.13 * p.noise(2.2, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
-    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
     inside = np.clip((p.u_m - 5.6) / p.footprint_m, 0.0, 1.0)
-    bay = line_coverage(p.v_m - 1.3, period_m=2.6, width_m=0.11, footprint_m=p.footprint_m) * inside
+    bay = p.lines(p.v_m - 1.3, 2.6, 0.11) * inside
     front = np.clip((0.055 - np.abs(p.u_m - 5.6)) / (2.0 * p.footprint_m) + 0.5, 0.0, 1.0)
     worn = np.clip(0.8 + 0.45 * p.noise(0.3, 3, 3), 0.25, 1.0)
-    return _mixed(colour, (0.66, 0.66, 0.63), np.maximum(bay, front) * worn)
+    return _mixed(_tar(p, 0.155), (0.66, 0.66, 0.63), np.maximum(bay, front) * worn)
 
 
 def _yard(p: Patch) -> np.ndarray:
-    level = 0.17 * (1.0 + 0.13 * p.noise(2.2, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
-    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
     patched = np.clip(3.0 * p.noise(5.0, 2, 4) - 1.2, 0.0, 0.35)
-    return _mixed(colour, (0.10, 0.10, 0.10), patched)
+    return _mixed(_tar(p, 0.17), (0.10, 0.10, 0.10), patched)
 
 
 def _road(p: Patch) -> np.ndarray:
-    level = 0.14 * (1.0 + 0.10 * p.noise(2.6, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
-    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
     across = np.minimum(p.footprint_m, 1.0)
     lanes = np.clip((0.06 - np.abs(np.abs(p.v_m) - 6.1)) / across + 0.5, 0.0, 1.0)
     dashes = np.clip((0.07 - np.abs(p.v_m)) / across + 0.5, 0.0, 1.0) * ((p.u_m % 6.0) < 3.0)
     worn = np.clip(0.85 + 0.4 * p.noise(0.3, 3, 3), 0.3, 1.0)
-    colour = _mixed(colour, (0.70, 0.70, 0.67), np.maximum(lanes, dashes) * worn)
+    colour = _mixed(_tar(p, 0.14, 0.10, 2.6), (0.70, 0.70, 0.67), np.maximum(lanes, dashes) * worn)
     verge = np.clip((np.abs(p.v_m) - 6.6) / across + 0.5, 0.0, 1.0)
     green = 0.16 * (1.0 + 0.2 * p.noise(3.0, 4, 5) + 0.16 * p.noise(0.10, 3, 6))
-    return _mixed(colour, green[:, None] * np.array([0.62, 1.0, 0.32], dtype=np.float32), verge)
+    return _mixed(colour, _tinted(green, 0.62, 1.0, 0.32), verge)
 
 
-_GROUNDS: dict[Ground, Callable[[Patch], np.ndarray]] = {
+GROUNDS: dict[Ground, Callable[[Patch], np.ndarray]] = {
     "tiles": _tiles,
     "grass": _grass,
     "floor": _floor,
@@ -142,20 +144,15 @@ _GROUNDS: dict[Ground, Callable[[Patch], np.ndarray]] = {
     "yard": _yard,
     "road": _road,
 }
-
-
-def ground_colour(ground: Ground, patch: Patch) -> np.ndarray:
-    """Return the ground's colours (n, 3); u_m is x and v_m is y of the world here."""
-    return _GROUNDS[ground](patch)
+"""The ground's colours (n, 3); u_m is x and v_m is y of the world here."""
 
 
 def _louvre(p: Patch) -> np.ndarray:
     slat = 0.5 + 0.5 * np.cos(2.0 * np.pi * p.v_m / 0.14)
     seen = np.clip(0.14 / (3.0 * p.footprint_m) - 0.5, 0.0, 1.0)
     level = 0.33 + seen * (0.20 * slat - 0.10)
-    colour = level[:, None] * np.array([0.95, 0.98, 1.0], dtype=np.float32)
-    post = line_coverage(p.u_m, period_m=0.8, width_m=0.05, footprint_m=p.footprint_m)
-    return _mixed(colour, (0.52, 0.53, 0.54), np.maximum(p.border(0.07), post))
+    posts = np.maximum(p.border(0.07), p.lines(p.u_m, 0.8, 0.05))
+    return _mixed(_tinted(level, 0.95, 0.98, 1.0), (0.52, 0.53, 0.54), posts)
 
 
 def _brick(p: Patch) -> np.ndarray:
@@ -164,10 +161,8 @@ def _brick(p: Patch) -> np.ndarray:
     tone = cell_random(across, p.v_m / 0.077, p.seed)
     seen = np.clip(0.077 / (1.5 * p.footprint_m) - 0.4, 0.0, 1.0)
     level = 0.26 * (1.0 + 0.40 * (tone - 0.5) * seen + 0.10 * p.noise(1.9, 3, 1))
-    colour = level[:, None] * np.array([1.0, 0.56, 0.42], dtype=np.float32)
-    bed = line_coverage(p.v_m, period_m=0.077, width_m=0.011, footprint_m=p.footprint_m)
-    head = line_coverage(across * 0.24, period_m=0.24, width_m=0.011, footprint_m=p.footprint_m)
-    return _mixed(colour, (0.42, 0.39, 0.35), np.maximum(bed, head))
+    joints = np.maximum(p.lines(p.v_m, 0.077, 0.011), p.lines(across * 0.24, 0.24, 0.011))
+    return _mixed(_tinted(level, 1.0, 0.56, 0.42), (0.42, 0.39, 0.35), joints)
 
 
 def _cartons(p: Patch) -> np.ndarray:
@@ -175,13 +170,10 @@ def _cartons(p: Patch) -> np.ndarray:
     tone = cell_random(p.u_m / across, p.v_m / up, p.seed)
     kind = cell_random(p.u_m / across, p.v_m / up, p.seed + 7)
     level = (0.30 + 0.16 * (tone - 0.5)) * (1.0 + 0.05 * p.noise(0.3, 2, 1))
-    colour = level[:, None] * np.array([1.0, 0.74, 0.47], dtype=np.float32)
-    colour = np.where((kind > 0.86)[:, None], 0.42 * np.array([0.9, 0.95, 1.0], dtype=np.float32), colour)
-    gap = np.maximum(
-        line_coverage(p.u_m, period_m=across, width_m=0.014, footprint_m=p.footprint_m),
-        line_coverage(p.v_m, period_m=up, width_m=0.014, footprint_m=p.footprint_m),
-    )
-    tape = line_coverage(p.u_m - across / 2, period_m=across, width_m=0.05, footprint_m=p.footprint_m)
+    colour, white = _tinted(level, 1.0, 0.74, 0.47), 0.42 * np.array([0.9, 0.95, 1.0], dtype=np.float32)
+    colour = np.where((kind > 0.86)[:, None], white, colour)
+    gap = np.maximum(p.lines(p.u_m, across, 0.014), p.lines(p.v_m, up, 0.014))
+    tape = p.lines(p.u_m - across / 2, across, 0.05)
     return _mixed(_mixed(colour, (0.46, 0.38, 0.27), 0.6 * tape), (0.05, 0.04, 0.03), gap)
 
 
@@ -195,22 +187,7 @@ def _render(p: Patch) -> np.ndarray:
     streak = p.noise(0.5, 3, 1, stretch=5.0)
     foot = np.exp(-np.maximum(p.v_m, 0.0) / 0.18)
     level = 0.50 * (1.0 + 0.06 * p.noise(2.0, 3, 2) + 0.05 * streak - 0.20 * foot)
-    return level[:, None] * np.array([1.0, 0.955, 0.87], dtype=np.float32)
-
-
-def _plaster(p: Patch) -> np.ndarray:
-    level = 0.58 * (1.0 + 0.04 * p.noise(1.5, 3, 1))
-    return level[:, None] * np.array([1.0, 0.93, 0.80], dtype=np.float32)
-
-
-def _wood(p: Patch) -> np.ndarray:
-    level = 0.27 * (1.0 + 0.16 * p.noise(0.3, 3, 1, stretch=0.12))
-    return level[:, None] * np.array([1.0, 0.73, 0.46], dtype=np.float32)
-
-
-def _metal(p: Patch) -> np.ndarray:
-    level = 0.44 * (1.0 + 0.05 * p.noise(0.8, 3, 1))
-    return level[:, None] * np.array([0.97, 0.99, 1.0], dtype=np.float32)
+    return _tinted(level, 1.0, 0.955, 0.87)
 
 
 def _door(p: Patch) -> np.ndarray:
@@ -221,25 +198,20 @@ def _door(p: Patch) -> np.ndarray:
 
 _MATERIALS: dict[Material, Callable[[Patch], np.ndarray]] = {
     "render": _render,
-    "metal": _metal,
+    "metal": lambda p: _tinted(0.44 * (1.0 + 0.05 * p.noise(0.8, 3, 1)), 0.97, 0.99, 1.0),
     "louvre": _louvre,
     "white": lambda p: p.plain(0.72, 0.72, 0.70),
     "dark": lambda p: p.plain(0.09, 0.09, 0.09),
-    "wood": _wood,
+    "wood": lambda p: _tinted(0.27 * (1.0 + 0.16 * p.noise(0.3, 3, 1, stretch=0.12)), 1.0, 0.73, 0.46),
     "cartons": _cartons,
     "brick": _brick,
-    "plaster": _plaster,
+    "plaster": lambda p: _tinted(0.58 * (1.0 + 0.04 * p.noise(1.5, 3, 1)), 1.0, 0.93, 0.80),
     "checkerboard": _checkerboard,
     "blue": lambda p: p.plain(0.06, 0.17, 0.42),
     "yellow": lambda p: p.plain(0.70, 0.42, 0.04),
     "door": _door,
     "lamp": lambda p: p.plain(6.0, 6.0, 5.8),
 }
-
-
-def material_colour(material: Material, patch: Patch) -> np.ndarray:
-    """Return a solid's colours (n, 3)."""
-    return _MATERIALS[material](patch)
 
 
 def hash_random(i: np.ndarray, j: np.ndarray, seed: int) -> np.ndarray:
@@ -424,7 +396,7 @@ class Solid:
                     local[rows, u], local[rows, v], float(size[u]), float(size[v]), footprint[rows], 3 + seed + shift
                 )
                 plain_top = seed == 2 and self.material in ("louvre", "door", "checkerboard")
-                colours[rows] = material_colour("metal" if plain_top else self.material, patch)
+                colours[rows] = _MATERIALS["metal" if plain_top else self.material](patch)
         return colours
 
 
@@ -436,9 +408,9 @@ def block(item: Box) -> Solid:
     return Solid(low, high, item.is_round, item.material)
 
 
-def trace(solids: list[Solid], eye: Vector3, rays: np.ndarray, rig: Rig, *, far_m: float, ceiling_m: float) -> Hits:
-    """Find what each ray (n, 3) from the eye hits first."""
-    origin = eye.astype(np.float32)
+def trace(solids: list[Solid], rays: np.ndarray, rig: Rig, *, far_m: float, ceiling_m: float) -> Hits:
+    """Find what each ray (n, 3) from the camera hits first."""
+    origin = rig.camera_position_world_m.astype(np.float32)
     depth = np.full(len(rays), _FAR, dtype=np.float32)
     index = np.full(len(rays), -3, dtype=np.int32)
     normal = np.zeros((len(rays), 3), dtype=np.float32)
@@ -507,12 +479,6 @@ SUN = np.array([1.34, 1.24, 1.06], dtype=np.float32)
 SKY = np.array([0.25, 0.295, 0.365], dtype=np.float32)
 _LAMPS = np.array([0.62, 0.61, 0.58], dtype=np.float32)
 _BOUNCE = np.array([0.52, 0.51, 0.49], dtype=np.float32)
-
-
-def sun_direction(scene: Scene) -> Vector3:
-    """Return the direction towards the light: (3,) in the world."""
-    azimuth, elevation = np.deg2rad(scene.sun_azimuth_deg), np.deg2rad(scene.sun_elevation_deg)
-    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
 def lit(scene: Scene, normals: np.ndarray, direct: np.ndarray) -> np.ndarray:

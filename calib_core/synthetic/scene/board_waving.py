@@ -5,17 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log
 from calib_core.intrinsics import Board
-from calib_core.synthetic.boards import BoardFilm, BoardShape, MovingBoard, PrintedBoard, printed_board, waved_poses
-from calib_core.synthetic.options import WavedBoard
+from calib_core.synthetic.boards import BoardMotion, MovingBoard, PrintedBoard, checkerboard, printed_board, waved_poses
 
+WAVED_BOARD = Board("checkerboard", 9, 6, 0.02214)
+"""The paper's."""
 _PERIOD_S = 1.0
 _HELD_SHARE = 0.45
 _EXPOSURE_S = 0.006
 _STEP_S = 1e-3
-_BLUR_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,18 +22,18 @@ class BoardWaving:
     """How a board is waved.
 
     Attributes:
-        board: the board as stated.
-        printed: the board as it is.
+        printed: the board.
         camera: before which it is waved.
         poses: camera_from_board, one per period.
         duration_s: how long.
+        board: as stated.
     """
 
-    board: Board
     printed: PrintedBoard
     camera: Camera
     poses: tuple[RigidTransform, ...]
     duration_s: float
+    board: Board = WAVED_BOARD
 
     def at(self, time_s: float) -> MovingBoard | None:
         """Return the board as it moves at a time from the start; None once it is put away."""
@@ -44,14 +43,13 @@ class BoardWaving:
         before, after = self._pose(time_s - _STEP_S), self._pose(time_s + _STEP_S)
         velocity = (after[1] - before[1]) / (2.0 * _STEP_S)
         turning = rotation_log(after[0] @ before[0].T) / (2.0 * _STEP_S)
-        film = BoardFilm(
-            blur_px=_BLUR_PX,
+        motion = BoardMotion(
             velocity_mps=(float(velocity[0]), float(velocity[1]), float(velocity[2])),
             turning_radps=(float(turning[0]), float(turning[1]), float(turning[2])),
             exposure_s=_EXPOSURE_S,
         )
         pose = RigidTransform(rotation, middle - rotation @ self.printed.middle_m)
-        return MovingBoard(self.printed, self.camera, pose, film)
+        return MovingBoard(self.printed, self.camera, pose, motion)
 
     def _pose(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation and middle of the board, between the poses before and after."""
@@ -64,24 +62,14 @@ class BoardWaving:
         return first.rotation @ rotation_exp(s * turn), (1.0 - s) * middles[0] + s * middles[1]
 
 
-def draw_waving(rng: np.random.Generator, camera: Camera, options: WavedBoard) -> BoardWaving:
+def draw_waving(rng: np.random.Generator, camera: Camera, duration_s: float) -> BoardWaving:
     """Draw how a board is waved.
 
     Args:
         rng: the only source of randomness.
         camera: before which it is waved.
-        options: of the board.
-
-    Raises:
-        OptionError: the board does not fit in the picture.
+        duration_s: how long.
     """
-    board = Board("checkerboard", options.columns, options.rows, options.square_mm / 1e3)
-    printed = printed_board(board, BoardShape(bend_m=(options.bend_mm / 1e3, 0.0)))
-    count = int(np.ceil(options.duration_s / _PERIOD_S)) + 1
-    try:
-        poses = waved_poses(rng, board, camera, count)
-    except ValueError as error:
-        raise OptionError(
-            f"the waved board of {board.columns} x {board.rows} corners: {error}; take a usual one"
-        ) from None
-    return BoardWaving(board, printed, camera, poses, options.duration_s)
+    count = int(np.ceil(duration_s / _PERIOD_S)) + 1
+    poses = waved_poses(rng, WAVED_BOARD, camera, count)
+    return BoardWaving(printed_board(WAVED_BOARD, checkerboard(WAVED_BOARD)), camera, poses, duration_s)

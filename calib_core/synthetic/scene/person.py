@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Vector2, Vector3
+from calib_core.arrays import Flags, Points3, Vector2, Vector3
 
 Surface = Literal["skin", "helmet", "jacket", "vest", "yoke", "trousers", "shoe", "stripe"]
 
@@ -143,3 +143,32 @@ def capsules(state: PersonState) -> tuple[Capsule, ...]:
         Capsule(head + 0.055 * up - 0.012 * forward, head + 0.075 * up - 0.005 * forward, 0.112, 0.106, "helmet"),
     ]
     return (*_legs(state, hips), *torso, *_arms(state, shoulders))
+
+
+def body_hides(
+    person: PersonState,
+    eye_m: Vector3,
+    points_m: Points3,
+    *,
+    half_width_m: float,
+    clearance_m: float,
+    height_m: float = np.inf,
+) -> Flags:
+    """Return which points (n, 3) a person hides from an eye: an upright body.
+
+    Args:
+        person: where they stand.
+        eye_m: (3,) in the world.
+        points_m: in the world.
+        half_width_m: of the body.
+        clearance_m: how far behind the body a point is at least.
+        height_m: of the body.
+    """
+    way = points_m - eye_m
+    reach = np.maximum(np.linalg.norm(way[:, :2], axis=1), 1e-9)
+    along = way[:, :2] / reach[:, None]
+    to_person = person.place_m - eye_m[:2]
+    depth = along @ to_person
+    aside = np.abs(along[:, 0] * to_person[1] - along[:, 1] * to_person[0])
+    height = eye_m[2] + way[:, 2] * depth / reach
+    return np.asarray((aside < half_width_m) & (depth > 0.0) & (depth < reach - clearance_m) & (height < height_m))

@@ -5,11 +5,12 @@ World frame: x forward, y left, z up; the radar stands above the origin.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from calib_core.arrays import Vector3
 from calib_core.synthetic.options import SceneName
 from calib_core.synthetic.simulated_pairs import PairsLayout
 
@@ -125,9 +126,10 @@ class Scene:
     board: Board | None = None
 
     @property
-    def board_corners_m(self) -> np.ndarray:
-        """The inner corners of the checkerboard in the world: (n, 3)."""
-        return np.zeros((0, 3)) if self.board is None else self.board.corners_m
+    def towards_sun(self) -> Vector3:
+        """The direction towards the light: (3,) in the world."""
+        azimuth, elevation = np.deg2rad(self.sun_azimuth_deg), np.deg2rad(self.sun_elevation_deg)
+        return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
     @property
     def narrow(self) -> bool:
@@ -144,6 +146,10 @@ class Scene:
             if float(np.linalg.norm(outside)) < clearance_m:
                 return False
         return True
+
+
+_ROOFTOP = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.9)
+_YARD = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
 
 
 def open_rooftop() -> Scene:
@@ -164,8 +170,7 @@ def open_rooftop() -> Scene:
         Scatterer((22.1, 4.9, 0.5), 5.0),
         Scatterer((22.1, -9.2, 0.5), 5.0),
     )
-    layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=100.0, height_m=0.19, roughness_m=0.004, separation_m=0.9)
-    return Scene("open-rooftop", "tiles", "city", (*parapets, *units), scatterers, layout)
+    return Scene("open-rooftop", "tiles", "city", (*parapets, *units), scatterers, _ROOFTOP)
 
 
 def open_yard() -> Scene:
@@ -185,17 +190,8 @@ def open_yard() -> Scene:
         Scatterer((25.7, -6.9, 1.0), 6.0),
         Scatterer((25.8, 6.0, 1.0), 8.0),
     )
-    layout = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
-    return Scene(
-        "open-yard",
-        "yard",
-        "city",
-        (*wall, *board),
-        scatterers,
-        layout,
-        sun_azimuth_deg=150.0,
-        board=Board(6.51, 0.9, 0.35, 0.30, 8, 5),
-    )
+    corners = Board(6.51, 0.9, 0.35, 0.30, 8, 5)
+    return Scene("open-yard", "yard", "city", (*wall, *board), scatterers, _YARD, sun_azimuth_deg=150.0, board=corners)
 
 
 def road() -> Scene:
@@ -209,8 +205,8 @@ def road() -> Scene:
         Box(95.0, 17.0, 18.0, 9.0, 6.5, "brick"),
     )
     scatterers = tuple(Scatterer((one.x_m, one.y_m, 1.0), 3.0) for one in (*lamps, signs[0]) if one.x_m < 50.0)
-    layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=5.5, height_m=0.19, roughness_m=0.004, separation_m=0.9)
-    return Scene("road", "road", "trees", (*lamps, *kerbs, *signs, *houses), scatterers, layout)
+    solids = (*lamps, *kerbs, *signs, *houses)
+    return Scene("road", "road", "trees", solids, scatterers, replace(_ROOFTOP, max_lateral_m=5.5))
 
 
 def scene_named(name: SceneName) -> Scene:
@@ -270,15 +266,8 @@ def _rooftop() -> Scene:
         Scatterer((9.4, -8.0, 0.3), -2.0),
         Scatterer((17.0, 3.9, 0.5), 2.0),
     ]
-    layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=100.0, height_m=0.19, roughness_m=0.004, separation_m=0.9)
-    return Scene(
-        "rooftop",
-        "tiles",
-        "city",
-        (*parapets, *copings, *plinths, *units, house, *door, *pipes, *skylight, *duct),
-        tuple(scatterers),
-        layout,
-    )
+    solids = (*parapets, *copings, *plinths, *units, house, *door, *pipes, *skylight, *duct)
+    return Scene("rooftop", "tiles", "city", solids, tuple(scatterers), _ROOFTOP)
 
 
 def _field() -> Scene:
@@ -338,17 +327,8 @@ def _aisle() -> Scene:
         Scatterer((20.8, 0.2, 1.0), 14.0),
     ]
     layout = PairsLayout(2.3, 16.0, 31.0, max_lateral_m=0.75, height_m=0.19, roughness_m=0.003, separation_m=0.5)
-    return Scene(
-        "aisle",
-        "floor",
-        "hall",
-        (*racks, *cart, *pallet, *wall, *sides, *lamps),
-        tuple(scatterers),
-        layout,
-        sun_azimuth_deg=165.0,
-        sun_elevation_deg=68.0,
-        ceiling_m=4.2,
-    )
+    solids = (*racks, *cart, *pallet, *wall, *sides, *lamps)
+    return Scene("aisle", "floor", "hall", solids, tuple(scatterers), layout, 165.0, 68.0, ceiling_m=4.2)
 
 
 def _checkerboard() -> Scene:
@@ -371,17 +351,12 @@ def _checkerboard() -> Scene:
         Scatterer((11.2, -2.9, 1.2), 4.0),
         Scatterer((11.3, 3.4, 1.0), 2.0),
     )
-    layout = PairsLayout(2.3, 9.6, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
-    return Scene(
-        "checkerboard",
-        "asphalt",
-        "city",
+    solids, corners, layout = (
         (*wall, *board, *things),
-        scatterers,
-        layout,
-        sun_azimuth_deg=150.0,
-        board=Board(11.21, -0.75, 1.1, 0.30, 8, 5),
+        Board(11.21, -0.75, 1.1, 0.30, 8, 5),
+        replace(_YARD, max_range_m=9.6),
     )
+    return Scene("checkerboard", "asphalt", "city", solids, scatterers, layout, sun_azimuth_deg=150.0, board=corners)
 
 
 _SCENES: dict[SceneName, Callable[[], Scene]] = {

@@ -3,34 +3,30 @@
 The truth about each placement follows from it: where and when the reflector stood, and in which frames it can be clicked.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calib_core.arrays import Points3, Vector3
+from calib_core.arrays import Flags, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
 from calib_core.synthetic.radar_returns import Antenna, RadarProfile, antennas_of, profile_with, radar_from_reported
-from calib_core.synthetic.rig import Rig, random_rig, typical_camera
+from calib_core.synthetic.rig import OTHER_OFFSET_M, OTHER_YAW_DEG, Rig, random_rig, typical_camera
+from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, Scatterer, Scene, scene_named
-from calib_core.synthetic.scene.story import Story, tell_story
+from calib_core.synthetic.scene.story import Resting, Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
-from calib_core.synthetic.scene.traffic import draw_movers, draw_passers_by
+from calib_core.synthetic.scene.traffic import VehicleState, draw_movers, draw_passers_by, hidden_by
 from calib_core.synthetic.simulated_pairs import PairsLayout, draw_positions
-from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
+from calib_core.synthetic.timeline import EVERYTHING, START_NS, Islands, SensorTimes, draw_islands, draw_times
 
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
     from calib_core.synthetic.scene.board_waving import BoardWaving
-from collections.abc import Iterator, Sequence
-
-from calib_core.arrays import Vector2, frozen_array
-from calib_core.synthetic.scene.person import PersonState, capsules
-from calib_core.synthetic.scene.story import Resting
-from calib_core.synthetic.scene.traffic import VehicleState, hidden_by
 
 _BEFORE_BOARD_M = 0.02
 """How far in front of the board's surface the apex is; the reflector's edges reach no farther back."""
@@ -51,7 +47,7 @@ class Stage:
         story: where person and reflector are at any time.
         frame_times: of the camera.
         antennas: the radar's, each with its times; one, or a near and a far one.
-        islands: the recorded parts of the story; None if all of it is recorded.
+        islands: the recorded parts of the story.
         clutter: static objects that the radar sees, in the world.
         clutter_bias: (k, 3) the constant error of each of them: range [m], sines of azimuth and elevation.
         reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
@@ -66,7 +62,7 @@ class Stage:
     story: Story
     frame_times: SensorTimes
     antennas: tuple[Antenna, ...]
-    islands: Islands | None
+    islands: Islands
     clutter: tuple[Scatterer, ...]
     clutter_bias: Points3
     reflector_bias: Points3
@@ -78,11 +74,6 @@ class Stage:
     def profile(self) -> RadarProfile:
         """The radar's profile."""
         return profile_with(self.options.radar, self.options.defects)
-
-    @property
-    def scan_times(self) -> SensorTimes:
-        """When the radar measured; of two antennas the far one."""
-        return self.antennas[0].times
 
     @property
     def published_camera(self) -> Camera:
@@ -111,10 +102,9 @@ class Stage:
 
     def recorded_span(self, start_s: float, end_s: float) -> tuple[TimeNs, TimeNs]:
         """Return the first and the last time, on the camera's clock, at which a part of the story is recorded."""
-        if self.islands is not None:
-            start_s, end_s = self.islands.first_after_s(start_s), self.islands.last_before_s(end_s)
-        start_ns = self.options.start_s * NS_PER_S
-        return TimeNs(start_ns + round(start_s * NS_PER_S)), TimeNs(start_ns + round(end_s * NS_PER_S))
+        recorded_s = self.islands.first_after_s(start_s), self.islands.last_before_s(end_s)
+        first, last = (TimeNs(START_NS + round(time_s * NS_PER_S)) for time_s in recorded_s)
+        return first, last
 
 
 def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
@@ -148,97 +138,53 @@ def set_stage(options: SimulationOptions) -> Stage:
     ghosts = tuple(_ghost(rng, resting.position_m, options.surroundings.ghost_share) for resting in story.restings)
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
-    waving = _waving(camera, options)
     flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
-    return Stage(
-        options,
-        scene,
-        rig,
-        story,
-        frame_times,
-        antennas,
-        islands,
-        clutter,
-        clutter_bias,
-        bias,
-        ghosts,
-        flickers,
-        waving,
-    )
+    sensors = (frame_times, antennas, islands)
+    waving = _waving(camera, options)
+    return Stage(options, scene, rig, story, *sensors, clutter, clutter_bias, bias, ghosts, flickers, waving)
 
 
 def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> Story:
     if len(positions_m):
-        story = tell_story(
-            child_rng(options, 2),
-            positions_m=positions_m,
-            dwell_s=options.dwell_s,
-            narrow=scene.narrow,
-            reflectors=options.reflectors,
-            leaves=options.person_leaves,
-            waving_s=options.waved_board.duration_s,
-            together=1 if options.reflectors_apart_m is None else options.reflectors,
-        )
+        story = tell_story(child_rng(options, 2), positions_m, options, narrow=scene.narrow)
     else:
         story = Story((), options.traffic.duration_s, (), np.zeros(0))
-    if options.traffic.any:
-        movers = draw_movers(child_rng(options, 20), options.traffic, scene, duration_s=story.duration_s)
-        story = replace(story, movers=movers)
-    if not options.surroundings.passers_by:
-        return story
-    passers_by = draw_passers_by(
-        child_rng(options, 15),
-        options.surroundings.passers_by,
-        duration_s=story.duration_s,
-        max_range_m=0.8 * scene.layout.max_range_m,
-    )
-    return replace(story, passers_by=passers_by)
+    duration_s, count = story.duration_s, options.surroundings.passers_by
+    movers = draw_movers(child_rng(options, 20), options.traffic, scene, duration_s)
+    passers_by = draw_passers_by(child_rng(options, 15), count, duration_s, 0.8 * scene.layout.max_range_m)
+    return replace(story, movers=movers, passers_by=passers_by)
 
 
 def _waving(camera: Camera, options: SimulationOptions) -> "BoardWaving | None":
-    if not options.waved_board.duration_s:
+    if not options.waved_board_s:
         return None
     from calib_core.synthetic.scene.board_waving import draw_waving
 
-    return draw_waving(child_rng(options, 21), camera, options.waved_board)
+    return draw_waving(child_rng(options, 21), camera, options.waved_board_s)
 
 
 def _other_rig(rig: Rig, options: SimulationOptions) -> Rig | None:
     """Draw the rig of the same radar and the second camera, of the same make as the first."""
-    other = options.other_camera
-    if not other.present:
+    if not options.other_camera:
         return None
-    nominal = replace(options.rig, camera_offset_m=other.offset_m, camera_angles_deg=(0.0, other.yaw_deg, 0.0))
+    nominal = replace(options.rig, camera_offset_m=OTHER_OFFSET_M, camera_angles_deg=(0.0, OTHER_YAW_DEG, 0.0))
     return random_rig(child_rng(options, 23), camera=rig.camera, options=nominal)
 
 
-def _frame_times(
-    rng: np.random.Generator, story: Story, islands: Islands | None, options: SimulationOptions
-) -> SensorTimes:
-    return draw_times(
-        rng,
-        duration_s=story.duration_s,
-        rate_hz=options.camera_rate_hz,
-        jitter_s=options.stamp_jitter_s,
-        dropped_share=options.dropped_share,
-        latency_s=0.0,
-        transfer_s=0.022,
-        start_ns=options.start_s * NS_PER_S,
-        islands=islands,
-    )
+def _frame_times(rng: np.random.Generator, story: Story, islands: Islands, options: SimulationOptions) -> SensorTimes:
+    rate_hz = options.camera_rate_hz
+    return draw_times(rng, story.duration_s, rate_hz, latency_s=0.0, transfer_s=0.022, islands=islands)
 
 
-def _islands(story: Story, options: SimulationOptions) -> Islands | None:
+def _islands(story: Story, options: SimulationOptions) -> Islands:
     if not options.islands:
-        return None
+        return EVERYTHING
     middles_s = np.array([resting.start_s + 0.5 * options.dwell_s for resting in story.restings])
     return draw_islands(child_rng(options, 16), middles_s)
 
 
 def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, options: SimulationOptions) -> Points3:
     """Draw apex positions in the world, clear of the solids."""
-    if not options.placements:
-        return _board_places(rng, scene, rig, options)
     rigs = [one for one in (rig, _other_rig(rig, options)) if one is not None]
     room = _Room(scene, added, rigs, _layout(scene, options), options)
     world_from_radar = rig.radar_from_world.inverse()
@@ -249,7 +195,7 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
             if len(found) < options.placements:
                 found += room.scene_at(rng, position, found)[: options.placements - len(found)]
         if len(found) == options.placements:
-            return np.concatenate([np.array(found), _board_places(rng, scene, rig, options)])
+            return np.concatenate([np.array(found).reshape(-1, 3), _board_places(rng, scene, rig, options)])
     raise OptionError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}; ask for fewer")
 
 
@@ -267,8 +213,7 @@ class _Room:
         """Yield those of some positions (n, 3) that all cameras see, clear of the solids and of what is taken by then."""
         whole = in_sight(self.added, batch)
         for one in self.rigs:
-            seen_px = one.camera.project(one.camera_from_world @ batch)
-            whole &= one.camera.in_image(seen_px, margin_px=-_RIM_SHARE * self.options.width_px)
+            whole &= _in_picture(one, batch)
         if self.scene.board is not None:
             whole &= ~self.scene.board.hides(batch)
         for position in batch[whole]:
@@ -290,6 +235,12 @@ class _Room:
         return places if len(places) == self.options.reflectors else []
 
 
+def _in_picture(rig: Rig, places_m: Points3) -> Flags:
+    """Return which places in the world (n, 3) the camera sees, off the picture's border."""
+    camera = rig.camera
+    return camera.in_image(camera.project(rig.camera_from_world @ places_m), margin_px=-_RIM_SHARE * camera.width_px)
+
+
 def _layout(scene: Scene, options: SimulationOptions) -> PairsLayout:
     """Return where the scene has room for the reflector; a larger one stands higher."""
     layout = scene.layout
@@ -307,10 +258,9 @@ def _board_places(rng: np.random.Generator, scene: Scene, rig: Rig, options: Sim
     """
     if not options.board_corners:
         return np.zeros((0, 3))
-    places = scene.board_corners_m - [_BEFORE_BOARD_M, 0.0, 0.0]
-    seen = rig.camera.in_image(
-        rig.camera.project(rig.camera_from_world @ places), margin_px=-_RIM_SHARE * options.width_px
-    )
+    assert scene.board is not None, "the options ask for corners only where there is a board"
+    places = scene.board.corners_m - [_BEFORE_BOARD_M, 0.0, 0.0]
+    seen = _in_picture(rig, places)
     if options.board_corners > int(seen.sum()):
         raise OptionError(
             f"simulation option board_corners is {options.board_corners}, but the camera sees {int(seen.sum())} inner "
@@ -328,18 +278,9 @@ def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions)
     if options.clutter == "scene":
         return visible
     reach = min(scene.layout.max_lateral_m + 0.4, 7.0)
-    hidden = tuple(
-        Scatterer(
-            (
-                float(rng.uniform(3.0, scene.layout.max_range_m)),
-                float(rng.uniform(-reach, reach)),
-                float(rng.uniform(0.05, 1.0)),
-            ),
-            float(rng.uniform(6.0, 18.0)),
-        )
-        for _ in range(8)
-    )
-    return visible + hidden
+    low, high = (3.0, -reach, 0.05, 6.0), (scene.layout.max_range_m, reach, 1.0, 18.0)
+    drawn = (rng.uniform(low, high).tolist() for _ in range(8))
+    return (*visible, *(Scatterer((x_m, y_m, z_m), rcs_dbsm) for x_m, y_m, z_m, rcs_dbsm in drawn))
 
 
 def _ghost(rng: np.random.Generator, position_m: Vector3, wanted_share: float) -> Scatterer | None:
@@ -349,10 +290,8 @@ def _ghost(rng: np.random.Generator, position_m: Vector3, wanted_share: float) -
         return None
     range_m = float(np.linalg.norm(position_m[:2])) + extra_m
     azimuth_rad = float(np.arctan2(position_m[1], position_m[0])) + aside_rad
-    return Scatterer(
-        (float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad)), float(-position_m[2])),
-        float(rcs_dbsm),
-    )
+    x_m, y_m = float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad))
+    return Scatterer((x_m, y_m, float(-position_m[2])), float(rcs_dbsm))
 
 
 _CLEARANCE_M = 0.16
@@ -422,23 +361,20 @@ def clear_frames(stage: Stage, resting: Resting) -> Iterator[TimeNs]:
     for i in inside[np.argsort(np.abs(moments[inside] - middle_s), kind="stable")].tolist():
         moment = stage.story.at(float(moments[i]))
         people = (moment.person, *moment.passers_by) if stage.options.person else moment.passers_by
-        states = [actor.state for actor in moment.traffic]
-        people = (*people, *(state for state in states if isinstance(state, PersonState)))
-        vehicles = [state for state in states if isinstance(state, VehicleState)]
-        eye_m, apex_m = stage.rig.camera_position_world_m, resting.position_m[None]
-        if any(hidden_by(vehicle, eye_m, apex_m)[0] for vehicle in vehicles):
-            continue
-        if all(_shows(stage, person, resting.position_m) for person in people):
+        states = (*people, *(actor.state for actor in moment.traffic))
+        if not any(_hides(stage, state, resting.position_m) for state in states):
             yield TimeNs(int(stage.frame_times.header_ns[i]))
 
 
-def _shows(stage: Stage, person: PersonState, position_m: Vector3) -> bool:
-    """Return whether no limb is near the line of sight from the camera to the reflector."""
+def _hides(stage: Stage, state: PersonState | VehicleState, position_m: Vector3) -> bool:
+    """Return whether a vehicle or a limb is near the line of sight from the camera to the reflector."""
     eye = stage.rig.camera_position_world_m
+    if isinstance(state, VehicleState):
+        return bool(hidden_by(state, eye, position_m[None])[0])
     sight = np.linspace(0.02, 0.98, 60)[:, None] * (position_m - eye) + eye
-    for limb in capsules(person):
+    for limb in capsules(state):
         steps = np.linspace(0.0, 1.0, 4)[:, None] * (limb.end_m - limb.start_m) + limb.start_m
         gap = np.linalg.norm(sight[:, None] - steps[None], axis=2).min()
         if gap < max(limb.start_radius_m, limb.end_radius_m) + _CLEARANCE_M:
-            return False
-    return True
+            return True
+    return False

@@ -10,7 +10,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Values, Vector2, Vector3
+from calib_core.arrays import Points3, Values, Vector2, Vector3
+from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scene.person import PersonState, hand_position
 from calib_core.synthetic.scene.traffic import Actor, Mover, PasserBy
 
@@ -100,19 +101,8 @@ class Script:
 
     def _add(self, action: Action, to_m: Vector2, duration_s: float, carrying: bool, placement: int) -> None:
         end_s = self.time_s + duration_s
-        self.legs.append(
-            Leg(
-                self.time_s,
-                end_s,
-                self.place_m,
-                to_m,
-                self.heading_rad,
-                action,
-                carrying,
-                self.walked_m,
-                placement,
-            )
-        )
+        way = (self.time_s, end_s, self.place_m, to_m)
+        self.legs.append(Leg(*way, self.heading_rad, action, carrying, self.walked_m, placement))
         self.time_s, self.place_m = end_s, to_m
 
 
@@ -120,6 +110,8 @@ _LEAD_IN_S = 0.6
 _TURNING_S = 0.5
 _BEHIND_M = 0.52
 """How far behind the reflector, seen from the radar, the person stands to put it down."""
+_START_M = np.array([2.6, -1.2])
+"""Where the person comes from, and where further reflectors wait."""
 _WAVING_M = np.array([0.95, 0.0])
 """Where the person stands who waves a board."""
 _PAST_MAST_M = np.array([1.1, 1.0])
@@ -190,17 +182,13 @@ class Story:
 
     def at(self, time_s: float) -> Moment:
         """Return the person and the reflectors at a time."""
-        traffic = tuple(mover.at(time_s) for mover in self.movers)
-        if not self.restings:
-            return Moment(_NOBODY, np.zeros(3), 0.0, None, 0.0, traffic=traffic)
-        moment = self._moment(time_s)
+        moment = self._moment(time_s) if self.restings else Moment(_NOBODY, np.zeros(3), 0.0, None, 0.0)
         if time_s < self.lead_s:
             moment = replace(moment, reflector_m=_BEHIND_SENSORS_M, resting=None)
-        if traffic:
-            moment = replace(moment, traffic=traffic)
-        resting = [one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting]
-        passing = [state for one in self.passers_by if (state := one.at(time_s)) is not None]
-        return replace(moment, standing=tuple(resting), passers_by=tuple(passing)) if resting or passing else moment
+        standing = (one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting)
+        passing = (state for one in self.passers_by if (state := one.at(time_s)) is not None)
+        traffic = (mover.at(time_s) for mover in self.movers)
+        return replace(moment, standing=tuple(standing), passers_by=tuple(passing), traffic=tuple(traffic))
 
     def people_at(self, time_s: float, *, person: bool) -> tuple[Actor, ...]:
         """Return the people besides the traffic, each with a name: who carries the reflector, if shown, and passers-by."""
@@ -275,32 +263,20 @@ def _in_order(positions: np.ndarray, start_m: Vector2, together: int) -> list[in
     return order
 
 
-def tell_story(
-    rng: np.random.Generator,
-    *,
-    positions_m: np.ndarray,
-    dwell_s: float,
-    narrow: bool = False,
-    start_m: tuple[float, float] = (2.6, -1.2),
-    reflectors: int = 1,
-    leaves: bool = False,
-    waving_s: float = 0.0,
-    together: int = 1,
-) -> Story:
+def tell_story(rng: np.random.Generator, positions_m: Points3, options: SimulationOptions, *, narrow: bool) -> Story:
     """Let a person carry the reflector to each position, always to the nearest one next.
+
+    Several reflectors are carried in turn; the last ones stay until the end. Those of one scene follow each other.
 
     Args:
         rng: the only source of randomness.
         positions_m: (n, 3) apex positions in the world, in any order.
-        dwell_s: from releasing the reflector to picking it up; with several, to picking up another one.
+        options: what the person does.
         narrow: the person steps back, not to the side.
-        start_m: where the person comes from, and where further reflectors wait.
-        reflectors: how many, carried in turn; the last ones stay until the end.
-        leaves: the person walks behind the sensors for that time instead of stepping aside.
-        waving_s: how long the person waves a board before that; the reflector is fetched from behind the sensors then.
-        together: how many positions that follow each other are visited without another in between.
     """
-    script = _waved_script(waving_s) if waving_s else Script(np.array(start_m))
+    reflectors, dwell_s = options.reflectors, options.dwell_s
+    script = _waved_script(options.waved_board_s) if options.waved_board_s else Script(_START_M)
+    together = 1 if options.reflectors_apart_m is None else reflectors
     lead_s = script.time_s
     restings: list[Resting] = []
     stands: list[Vector2] = []
@@ -310,7 +286,7 @@ def tell_story(
         stands.append(position[:2] + _BEHIND_M * away)
         start_s = script.put_down(stands[index], index, position[:2])
         aside_m = _aside(rng, stands[index], away, narrow)
-        if leaves:
+        if options.person_leaves:
             script.leave(stands[index], dwell_s, index, position[:2])
         else:
             script.wait(aside_m, dwell_s, index, position[:2])
@@ -319,7 +295,7 @@ def tell_story(
         restings.append(Resting(index, start_s, math.inf, position, facing_rad, left_s))
         taken = index + 1 - reflectors
         if taken < 0:
-            script.walk(np.array(start_m), carrying=False, placement=index)
+            script.walk(_START_M, carrying=False, placement=index)
             continue
         quickly_s = STEP_AWAY_S if taken == index else None
         script.walk(stands[taken], carrying=False, placement=index, duration_s=quickly_s)

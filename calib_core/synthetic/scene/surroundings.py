@@ -16,10 +16,9 @@ _CAR_CLEARANCE_M = 1.2
 _FENCE_M = (7.5, 5.0, 21.0)
 """Distance from the radar's axis, begin and end of the fence."""
 _POST_DBSM = 8.0
-_CART_HEIGHT_M = 0.5
-_FLICKER_S = (8.0, 30.0)
-_FLICKER_SHARE = (0.2, 0.6)
-_FLICKER_DBSM = (6.0, 14.0)
+_CART_HEIGHT_M, _CART_BEHIND_M = 0.5, 1.0
+_FLICKER = ((0.2, 1.5), (6.0, 14.0), (8.0, 30.0), (0.2, 0.6), (0.0, 1.0))
+"""Height [m], radar cross-section [dBsm], period [s], share of it and phase of a target that comes and goes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +37,13 @@ class Flicker:
 
 def draw_flickers(rng: np.random.Generator, count: int, scene: Scene) -> tuple[Flicker, ...]:
     """Draw targets that come and go, among the placements and a little beyond."""
-    found = []
+    layout, found = scene.layout, []
+    spans = np.array([(3.0, layout.max_range_m + 2.0), (-1.0, 1.0), *_FLICKER])
     for _ in range(count):
-        range_m, aside = rng.uniform(3.0, scene.layout.max_range_m + 2.0), rng.uniform(-1.0, 1.0)
-        azimuth_rad = aside * min(np.deg2rad(scene.layout.max_azimuth_deg), scene.layout.max_lateral_m / range_m)
+        range_m, aside, z_m, rcs_dbsm, *rhythm = rng.uniform(*spans.T).tolist()
+        azimuth_rad = aside * min(np.deg2rad(layout.max_azimuth_deg), layout.max_lateral_m / range_m)
         x_m, y_m = float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad))
-        scatterer = Scatterer((x_m, y_m, float(rng.uniform(0.2, 1.5))), float(rng.uniform(*_FLICKER_DBSM)))
-        rhythm = (float(rng.uniform(*_FLICKER_S)), float(rng.uniform(*_FLICKER_SHARE)), float(rng.uniform()))
-        found.append(Flicker(scatterer, *rhythm))
+        found.append(Flicker(Scatterer((x_m, y_m, z_m), rcs_dbsm), *rhythm))
     return tuple(found)
 
 
@@ -118,8 +116,8 @@ def in_sight(added: Scene, places_m: Points3) -> Flags:
     return np.array([all(added.free(step * place[:2], 0.2) for step in steps) for place in places_m], dtype=np.bool_)
 
 
-def cart_position(apex_m: Vector3, surroundings: Surroundings) -> Vector3:
+def cart_position(apex_m: Vector3) -> Vector3:
     """Return where the cart's echo is for a reflector: straight behind it as seen from the radar."""
     away = apex_m[:2] / max(float(np.linalg.norm(apex_m[:2])), 1e-9)
-    place = apex_m[:2] + surroundings.companion_distance_m * away
+    place = apex_m[:2] + _CART_BEHIND_M * away
     return np.array([place[0], place[1], _CART_HEIGHT_M])

@@ -282,7 +282,7 @@ class Mover:
         return Actor(self.track, self.label, PersonState(x_m, y_m, heading_rad, walked_m, pace))
 
 
-def draw_movers(rng: np.random.Generator, traffic: Traffic, scene: Scene, *, duration_s: float) -> tuple[Mover, ...]:
+def draw_movers(rng: np.random.Generator, traffic: Traffic, scene: Scene, duration_s: float) -> tuple[Mover, ...]:
     """Draw where everybody goes during the story.
 
     Args:
@@ -291,9 +291,9 @@ def draw_movers(rng: np.random.Generator, traffic: Traffic, scene: Scene, *, dur
         scene: its solids are in the way.
         duration_s: of the story.
     """
-    walkers = (_wandering(rng, "person", number, scene, duration_s) for number in range(1, traffic.walkers + 1))
-    robots = (_wandering(rng, "robot", number, scene, duration_s) for number in range(1, traffic.robots + 1))
-    cars = (_round_trip(rng, number, traffic, duration_s) for number in range(1, traffic.cars + 1))
+    walkers = [_wandering(rng, "person", number + 1, scene, duration_s) for number in range(traffic.walkers)]
+    robots = [_wandering(rng, "robot", number + 1, scene, duration_s) for number in range(traffic.robots)]
+    cars = [_round_trip(rng, number + 1, traffic, duration_s) for number in range(traffic.cars)]
     return (*walkers, *robots, *cars)
 
 
@@ -432,7 +432,7 @@ class PasserBy:
 
 
 def draw_passers_by(
-    rng: np.random.Generator, count: int, *, duration_s: float, max_range_m: float
+    rng: np.random.Generator, count: int, duration_s: float, max_range_m: float
 ) -> tuple[PasserBy, ...]:
     """Draw people who cross the scene from one side to the other, spread over the story.
 

@@ -11,8 +11,8 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, time_from_part
 from calib_core.options import GatingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings import open_recording
+from calib_core.synthetic import simulate
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.scans import simulate_scans
 from calib_core.synthetic.scene.stage import SimulatedPlacement
 from tests.scans import scan_of
 
@@ -62,7 +62,7 @@ def rests_at(placement: Placement, start: TimeNs, end: TimeNs, position_radar_m:
     ids=["rooftop", "field-imaging-heavy", "aisle-heavy", "checkerboard-short"],
 )
 def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(options):
-    simulated = simulate_scans(options)
+    simulated = simulate(options)
     found = find_placements(simulated.scans, GatingOptions())
     hits = sum(any(is_of(placement, truth) for placement in found) for truth in simulated.placements)
     assert hits >= 0.95 * len(simulated.placements) - 0.5

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from benchmarks.boards import BoardFilm, render_board, true_corners
 from calib_core.camera import Camera, CameraModel
 from calib_core.errors import InputError, RecordingError
 from calib_core.intrinsics import (
@@ -22,7 +23,7 @@ from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
 from calib_core.intrinsics.board_search import PictureOrder
 from calib_core.measurements import TimeNs, Unsolvable
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import BoardFilm, render_board, true_corners, waved_poses
+from calib_core.synthetic.boards import waved_poses
 
 BOARD = Board("checkerboard", 5, 4, 0.03)
 

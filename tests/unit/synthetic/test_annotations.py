@@ -8,18 +8,9 @@ import pytest
 
 from calib_core.measurements import NS_PER_S, Box
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.synthetic import (
-    PRESETS,
-    SimulatedRecording,
-    SimulationOptions,
-    Surroundings,
-    Traffic,
-    simulate,
-    true_boxes,
-    true_labels,
-    write_recording,
-)
-from calib_core.synthetic.rendering.frames import FrameRenderer
+from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, Surroundings, simulate, write_recording
+from calib_core.synthetic.annotations import true_boxes, true_labels
+from calib_core.synthetic.options import Traffic
 from calib_core.synthetic.scene.traffic import ActorLabel, Mover
 
 WALK = SimulationOptions(
@@ -28,7 +19,6 @@ WALK = SimulationOptions(
     width_px=320,
     height_px=180,
     camera_rate_hz=2.0,
-    dropped_share=0.0,
     traffic=Traffic(walkers=2, duration_s=8.0),
 )
 
@@ -47,21 +37,11 @@ def _boxes(*places: tuple[ActorLabel, float, float, float]) -> dict[str, Box]:
     return {box.track: box for box in true_boxes(_standing(simulate(WALK), *places)).frames[3].boxes}
 
 
-@pytest.mark.parametrize(
-    ("message", "container"),
-    [
-        ("filled", "ros1"),
-        ("stock", "ros1"),
-        ("cloud", "ros1"),
-        ("vendor", "ros1"),
-        ("filled", "mcap"),
-        ("filled", "jsonl"),
-    ],
-)
-def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(message, container, tmp_path):
-    recording = simulate(replace(WALK, radar_message=message, width_px=64, height_px=64, camera_rate_hz=1.0))
+@pytest.mark.parametrize(("radar", "container"), [("awr1843", "ros1"), ("imaging", "ros1"), ("awr1843", "jsonl")])
+def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(radar, container, tmp_path):
+    recording = simulate(replace(WALK, radar=radar, width_px=64, height_px=64, camera_rate_hz=1.0))
     write_recording(recording, tmp_path, (container,))
-    sent = {scan.time: scan for scan in recording.scans()}
+    sent = {scan.time: scan for scan in recording.scans_of(recording.stage.antennas[0])}
     labelled = {scan.radar_time: scan.tracks for scan in true_labels(recording).scans}
     assert labelled.keys() == sent.keys()
     where = [tmp_path / "radar.bag"] if container == "ros1" else [tmp_path / f"recording_{container}"]
@@ -84,7 +64,10 @@ def test_a_return_named_after_a_person_comes_from_where_that_person_is():
     times = recording.stage.antennas[0].times
     checked = 0
     for scan, labels, moment_s in zip(
-        recording.scans(), true_labels(recording).scans, times.moment_s.tolist(), strict=True
+        recording.scans_of(recording.stage.antennas[0]),
+        true_labels(recording).scans,
+        times.moment_s.tolist(),
+        strict=True,
     ):
         for point, track in zip(scan.points_radar_m, labels.tracks, strict=True):
             if track:
@@ -98,7 +81,7 @@ def test_a_return_named_after_a_person_comes_from_where_that_person_is():
 def test_a_box_touches_what_the_renderer_draws():
     recording = _standing(simulate(replace(WALK, width_px=640, height_px=360)), ("person", 6.0, 0.4, 2.0))
     stage = recording.stage
-    renderer = FrameRenderer.of(stage.scene, stage.rig)
+    renderer = recording.renderer
     moment = stage.story.at(1.0)
     drawn = np.abs(
         renderer.render(moment, person=False).astype(int)
@@ -180,7 +163,7 @@ def test_the_radar_sees_cars_of_both_directions_at_their_ranges(preset, beyond_m
     options = PRESETS[preset]
     recording = simulate(replace(options, traffic=replace(options.traffic, duration_s=20.0), camera_rate_hz=1.0))
     ranges, speeds = [], []
-    for scan, labels in zip(recording.scans(), true_labels(recording).scans, strict=True):
+    for scan, labels in zip(recording.scans_of(recording.stage.antennas[0]), true_labels(recording).scans, strict=True):
         of_cars = np.array([track.startswith("car-") for track in labels.tracks], dtype=bool)
         ranges += np.linalg.norm(scan.points_radar_m[of_cars], axis=1).tolist()
         speeds += scan.doppler_mps[of_cars].tolist()

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from calib_core.interchange import read_clicks
-from calib_core.synthetic import Clicking, SimulatedScans, SimulationOptions, simulate, simulate_scans
+from calib_core.synthetic import SimulatedRecording, SimulationOptions, simulate
 from calib_core.synthetic.files import clicks_text, truth_text
+from calib_core.synthetic.options import Clicking
 
 QUIET = SimulationOptions(
     scene="field",
@@ -23,18 +24,18 @@ QUIET = SimulationOptions(
 )
 
 
-def _session(**how: float) -> SimulatedScans:
-    return simulate_scans(replace(QUIET, clicking=Clicking(**how)))
+def _session(**how: float) -> SimulatedRecording:
+    return simulate(replace(QUIET, clicking=Clicking(**how)))
 
 
-def _offsets(session: SimulatedScans) -> np.ndarray:
+def _offsets(session: SimulatedRecording) -> np.ndarray:
     """Return click minus true pixel of its placement: (n, 2) [px]."""
     pixels = {placement.id: placement.pixel_px for placement in session.placements}
     return np.array([[c.click.u_px, c.click.v_px] - pixels[c.placement_id] for c in session.clicked])
 
 
 def test_by_default_there_is_one_faultless_click_per_placement():
-    session = simulate_scans(QUIET)
+    session = simulate(QUIET)
     assert [one.placement_id for one in session.clicked] == [placement.id for placement in session.placements]
     assert [click.image_time for click in session.clicks] == [p.best_image_time for p in session.placements]
     assert not any(one.faults for one in session.clicked)
@@ -51,7 +52,7 @@ def test_people_click_a_placement_several_times_in_different_frames():
     for one in session.clicked:
         assert by_id[one.placement_id].start < one.click.image_time < by_id[one.placement_id].end
     assert sum("repeated" in one.faults for one in session.clicked) == 16
-    assert session.clicks[0] == simulate_scans(QUIET).clicks[0]
+    assert session.clicks[0] == simulate(QUIET).clicks[0]
     assert np.abs(_offsets(session)).max() < 2.5
 
 
@@ -101,7 +102,7 @@ def test_the_truth_file_tells_which_placement_each_click_names_and_what_is_wrong
 
 
 def test_two_reflectors_may_be_clicked_late_and_twice_too():
-    session = simulate_scans(
+    session = simulate(
         replace(QUIET, reflectors=2, islands=True, clicking=Clicking(clicks_per_placement=2, late_share=0.4))
     )
     times = [int(click.image_time) for click in session.clicks]

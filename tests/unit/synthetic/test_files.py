@@ -19,15 +19,9 @@ from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
-from calib_core.synthetic import (
-    PRESETS,
-    OtherCamera,
-    SimulatedFrame,
-    SimulatedRecording,
-    SimulationOptions,
-    simulate,
-    write_recording,
-)
+from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, simulate, write_recording
+from calib_core.synthetic.recording import SimulatedFrame
+from calib_core.synthetic.rig import OTHER_OFFSET_M
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
 
@@ -46,7 +40,7 @@ def folder(recording: SimulatedRecording, tmp_path_factory: pytest.TempPathFacto
 
 @pytest.fixture(scope="module")
 def scans(recording: SimulatedRecording) -> tuple[RadarScan, ...]:
-    return tuple(recording.scans())
+    return tuple(scan for antenna in recording.stage.antennas for scan in recording.scans_of(antenna))
 
 
 @pytest.fixture(scope="module")
@@ -116,28 +110,11 @@ def test_camera_info_carries_the_intrinsics(recording, folder):
     assert (infos[0].distortion_model, infos[0].width, infos[0].height) == ("plumb_bob", 128, 80)
 
 
-def test_raw_images_contain_the_exact_pixels(tmp_path):
-    recording = simulate(replace(OPTIONS, placements=1, raw_images=True, camera_rate_hz=1.0))
-    write_recording(recording, tmp_path)
-    images = [message for _, message in _messages([tmp_path / "camera.bag"], "/camera/image_raw")]
-    for message, frame in zip(images, recording.frames(), strict=True):
-        assert message.encoding == "bgr8"
-        assert np.array_equal(message.data.reshape(message.height, message.width, 3), frame.pixels)
-
-
-def test_the_stock_driver_leaves_four_fields_at_zero(tmp_path):
-    recording = simulate(replace(OPTIONS, placements=1, radar_message="stock", camera_rate_hz=1.0))
-    write_recording(recording, tmp_path)
-    messages = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan")]
-    assert {(m.range, m.doppler_bin, m.bearing, m.intensity) for m in messages} == {(0.0, 0, 0.0, 0.0)}
-    assert {m.x for m in messages} != {0.0}
-
-
 def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path):
     recording = simulate(replace(OPTIONS, placements=1, radar="imaging", camera_rate_hz=1.0))
     write_recording(recording, tmp_path)
     clouds = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan_pcl")]
-    assert len(clouds) == len(list(recording.scans()))
+    assert len(clouds) == len(recording.scans)
 
 
 def test_truth_and_clicks_agree_with_the_simulation(recording, folder):
@@ -182,19 +159,8 @@ def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, sca
         np.testing.assert_allclose([target["y_m"] for target in read["targets"]], scan.points_radar_m[:, 1], atol=1e-6)
 
 
-@pytest.mark.parametrize("container", ["ros1", "mcap"])
-def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path):
-    write_recording(simulate(replace(OPTIONS, radar_message="vendor")), tmp_path, (container,))
-    path = tmp_path / ("radar.bag" if container == "ros1" else "recording_mcap")
-    messages = [message for _, message in _messages([path], "/acme/packets")]
-    for message, scan in zip(messages, scans, strict=True):
-        assert _stamp(message) == scan.time
-        found = [(one.f_pos_x, one.f_pos_y, one.f_pos_z) for one in message.s_detections]
-        np.testing.assert_allclose(np.array(found).reshape(-1, 3), scan.points_radar_m, rtol=1e-5, atol=1e-6)
-
-
 def test_a_second_camera_is_written_into_the_same_recording(tmp_path):
-    recording = simulate(replace(OPTIONS, camera_rate_hz=1.0, other_camera=OtherCamera(present=True)))
+    recording = simulate(replace(OPTIONS, camera_rate_hz=1.0, other_camera=True))
     other = recording.other_camera
     assert other is not None
     write_recording(recording, tmp_path)
@@ -210,10 +176,10 @@ def test_a_second_camera_is_written_into_the_same_recording(tmp_path):
 
 
 def test_the_second_camera_sees_the_same_placements_from_its_own_rig():
-    options = replace(OPTIONS, placements=8, other_camera=OtherCamera(present=True))
+    options = replace(OPTIONS, placements=8, other_camera=True)
     recording = simulate(options)
     other = recording.other_camera
-    assert np.linalg.norm(other.stage.rig.camera_position_radar_m - options.other_camera.offset_m) < 0.06
+    assert np.linalg.norm(other.stage.rig.camera_position_radar_m - OTHER_OFFSET_M) < 0.06
     assert len(other.placements) == 8
     for here, there in zip(recording.placements, other.placements, strict=True):
         assert np.array_equal(here.position_radar_m, there.position_radar_m)
@@ -222,7 +188,7 @@ def test_the_second_camera_sees_the_same_placements_from_its_own_rig():
 
 
 def test_a_folder_of_pictures_has_no_room_for_a_second_camera(tmp_path):
-    recording = simulate(replace(OPTIONS, other_camera=OtherCamera(present=True)))
+    recording = simulate(replace(OPTIONS, other_camera=True))
     with pytest.raises(InputError, match="write a recording of two cameras as ros1, mcap or db3"):
         write_recording(recording, tmp_path / "new", ("csv",))
     assert not (tmp_path / "new").exists()
@@ -242,7 +208,7 @@ def test_every_preset_is_a_recording_of_its_own(name):
     recording = simulate(small)
     assert len(recording.placements) == small.standing_places
     assert len(recording.clicks) >= 4
-    assert len(next(recording.scans())) > 0
+    assert len(next(recording.scans_of(recording.stage.antennas[0]))) > 0
 
 
 def test_the_page_describes_every_preset_and_no_other(project_root):

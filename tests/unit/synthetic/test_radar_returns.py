@@ -10,14 +10,7 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar, direction_cosines, polar_from_cartesian
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, write_ros1_bag
-from calib_core.synthetic import (
-    RADAR_PROFILES,
-    IntrinsicsErrors,
-    RadarDefects,
-    SimulationOptions,
-    simulate,
-    simulate_scans,
-)
+from calib_core.synthetic import RADAR_PROFILES, RadarDefects, SimulationOptions, simulate
 from calib_core.synthetic.files import (
     CLOUD_TOPIC,
     SECOND_COLUMN,
@@ -26,6 +19,7 @@ from calib_core.synthetic.files import (
     radar_messages,
     truth_text,
 )
+from calib_core.synthetic.options import IntrinsicsErrors
 from calib_core.synthetic.radar_returns import Targets, measure, radar_from_reported, second_azimuths
 from calib_core.synthetic.rig import RigOptions, radar_stand
 
@@ -59,13 +53,13 @@ def _reported(defects: RadarDefects) -> np.ndarray:
 
 def _windows(options: SimulationOptions) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return, for each placement, its true position and the returns (n, 3) while it stands."""
-    session = simulate_scans(options)
+    session = simulate(options)
     return [(p.position_radar_m, session.scans.between(p.start, p.end).points_radar_m) for p in session.placements]
 
 
 def _strongest(options: SimulationOptions) -> tuple[np.ndarray, np.ndarray]:
     """Return the true polar coordinates of each placement and the medians of its reported ones, both (n, 3)."""
-    session = simulate_scans(options)
+    session = simulate(options)
     medians = []
     for placement in session.placements:
         window = session.scans.between(placement.start, placement.end)
@@ -166,7 +160,7 @@ def test_a_2d_radar_reports_no_elevation_but_the_slant_range(defects, low_m, hig
 
 def test_bins_are_as_wide_as_asked():
     defects = RadarDefects(range_bin_m=0.15, azimuth_bins=32, elevation_bins=128)
-    r, u, w = direction_cosines(simulate_scans(replace(QUIET, defects=defects)).scans.points_radar_m).T
+    r, u, w = direction_cosines(simulate(replace(QUIET, defects=defects)).scans.points_radar_m).T
     for values, width in ((r, 0.15), (u, 2.0 / 32.0), (w, 2.0 / 128.0)):
         assert np.abs(values / width - np.round(values / width)).max() < 1e-4
 
@@ -183,22 +177,22 @@ def test_returns_scatter_from_scan_to_scan_as_asked():
 
 def test_near_and_far_scans_may_follow_each_other_in_turn():
     defects = RadarDefects(near_and_far=True, in_turn=True)
-    far, near = simulate_scans(replace(QUIET, dropped_share=0.0, placements=2, defects=defects)).stage.antennas
+    far, near = simulate(replace(QUIET, placements=2, defects=defects)).stage.antennas
     times = np.concatenate([far.times.header_ns, near.times.header_ns])
     order = np.argsort(times)
-    assert (np.diff(order < len(far.times)) != 0).all()
+    assert (np.diff(order < len(far.times)) != 0).mean() > 0.94  # but for those that are lost
     assert np.diff(times[order]).min() > 0.3 * np.median(np.diff(far.times.header_ns))
 
 
 def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
-    near_and_far = replace(QUIET, clutter="scene", dropped_share=0.0, defects=RadarDefects(near_and_far=True))
+    near_and_far = replace(QUIET, clutter="scene", defects=RadarDefects(near_and_far=True))
     messages = list(radar_messages(simulate(replace(near_and_far, placements=3)), 1))
     assert [m.receive_time for m in messages] == sorted(m.receive_time for m in messages)
     ranges: dict[str, np.ndarray] = {}
     for name, rate_hz in (("near", 25.0), ("far", 20.0)):
         clouds = [m.body for m in messages if m.topic == f"{CLOUD_TOPIC}_{name}" and isinstance(m.body, CloudMessage)]
         steps_s = np.diff([int(cloud.stamp) for cloud in clouds]) / NS_PER_S
-        assert 1.0 / float(np.mean(steps_s)) == pytest.approx(rate_hz, rel=0.01)
+        assert 1.0 / float(np.median(steps_s)) == pytest.approx(rate_hz, rel=0.01)
         points = np.concatenate([cloud.values for cloud in clouds])
         ranges[name] = np.linalg.norm(points[points[:, 4] == 0.0, :3], axis=1)
     assert np.quantile(ranges["near"], 0.98) < 10.2
@@ -207,7 +201,7 @@ def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
 
 
 def test_a_session_without_pictures_has_the_scans_of_both_antennas():
-    session = simulate_scans(replace(QUIET, placements=2, defects=RadarDefects(near_and_far=True)))
+    session = simulate(replace(QUIET, placements=2, defects=RadarDefects(near_and_far=True)))
     assert len(session.scans) == sum(len(antenna.times) for antenna in session.stage.antennas)
     assert (np.diff(session.scans.times_ns) > 0).all()
 
@@ -243,7 +237,7 @@ def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where, 
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
     with open_recording([path], RecordingOptions(), require=("radar",)) as opened:
         scans = opened.radar_scans()
-    measured = list(recording.scans())
+    measured = list(recording.scans_of(recording.stage.antennas[0]))
     assert len(scans) == len(measured)
     assert scans.alternative_of is not None
     for number in (0, 40, len(measured) - 1):
@@ -254,7 +248,7 @@ def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where, 
 
 
 def test_without_defects_no_draw_changes():
-    plain, other = simulate_scans(QUIET), simulate_scans(replace(QUIET, defects=RadarDefects(azimuth_scale=1.01)))
+    plain, other = simulate(QUIET), simulate(replace(QUIET, defects=RadarDefects(azimuth_scale=1.01)))
     assert np.array_equal(plain.scans.times_ns, other.scans.times_ns)
     assert len(plain.scans.points_radar_m) == pytest.approx(len(other.scans.points_radar_m), abs=5)
     assert plain.clicks == other.clicks

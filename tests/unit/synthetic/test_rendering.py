@@ -11,7 +11,7 @@ from calib_core.synthetic import Rig, SimulationOptions, random_rig, simulate, t
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import apex_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays, trace_still
-from calib_core.synthetic.rendering.surfaces import fractal_noise, line_coverage, sun_direction
+from calib_core.synthetic.rendering.surfaces import fractal_noise, line_coverage
 from calib_core.synthetic.scene.person import PersonState
 from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import Stage, set_stage
@@ -73,8 +73,7 @@ def _before_green(rig: Rig) -> FrameRenderer:
     still = Still(
         levels, np.full(shape, np.inf), np.zeros(shape, dtype=bool), pixel_rays(rig), rig.camera_position_world_m
     )
-    scene = scene_named("field")
-    return FrameRenderer(scene, rig, still, sun_direction(scene))
+    return FrameRenderer(scene_named("field"), rig, still)
 
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])

@@ -103,11 +103,9 @@ def test_more_placements_than_fit_are_refused_with_the_number_that_fits():
 
 
 def test_the_camera_sits_where_the_options_put_it_and_looks_where_the_radar_looks():
-    options = RigOptions(
-        radar_height_m=2.0, camera_offset_m=(0.1, -0.2, 0.3), camera_offset_sigma_m=0.0, camera_angle_sigma_deg=0.0
-    )
+    options = RigOptions(radar_height_m=2.0, camera_offset_m=(0.1, -0.2, 0.3), camera_angle_sigma_deg=0.0)
     rig = random_rig(np.random.default_rng(1), camera=typical_camera(), options=options)
-    assert rig.camera_position_radar_m == pytest.approx([0.1, -0.2, 0.3])
+    assert rig.camera_position_radar_m == pytest.approx([0.1, -0.2, 0.3], abs=0.04)
     assert np.array_equal(rig.camera_from_radar.rotation, nominal_rotation())
     ahead = rig.radar_from_world.inverse() @ np.array([[5.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     assert ahead[1] == pytest.approx([0.0, 0.0, 2.0])

@@ -12,10 +12,10 @@ import pytest
 from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import open_recording
-from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, WavedBoard, simulate, write_recording
+from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, simulate, write_recording
 from calib_core.synthetic.scene.stage import set_stage
 
-BOARD = WavedBoard(duration_s=5.0)
+WAVED_S = 5.0
 OPTIONS = replace(
     PRESETS["intrinsics"],
     placements=2,
@@ -24,7 +24,7 @@ OPTIONS = replace(
     height_px=250,
     camera_rate_hz=4.0,
     radar_rate_hz=2.0,
-    waved_board=BOARD,
+    waved_board_s=WAVED_S,
 )
 
 
@@ -46,7 +46,7 @@ def test_the_board_is_where_the_truth_says(recording):
     seen = []
     for frame, moment_s in zip(recording.frames(12), stage.frame_times.moment_s, strict=False):
         moving = stage.waving.at(float(moment_s))
-        true = moving.pixels(moving.printed.corners_m)
+        true = moving.camera.project(moving.camera_from_board @ moving.printed.corners_m)
         found, corners = cv2.findChessboardCorners(frame.pixels, (9, 6))
         if found:
             near = np.linalg.norm(corners.reshape(-1, 1, 2) - true[None], axis=2).min(axis=1)
@@ -57,7 +57,9 @@ def test_the_board_is_where_the_truth_says(recording):
 
 def test_the_board_is_held_still_between_poses_and_moves_in_between(recording):
     waving = recording.stage.waving
-    speeds = [float(np.linalg.norm(moving.film.velocity_mps)) for s in (0.2, 0.7, 1.2, 1.7) if (moving := waving.at(s))]
+    speeds = [
+        float(np.linalg.norm(moving.motion.velocity_mps)) for s in (0.2, 0.7, 1.2, 1.7) if (moving := waving.at(s))
+    ]
     assert speeds[0] == speeds[2] == 0.0
     assert min(speeds[1], speeds[3]) > 0.02
     middles = [
@@ -71,7 +73,7 @@ def test_the_reflector_is_fetched_after_the_board_is_put_away(recording):
     story = recording.stage.story
     assert story.at(2.0).resting is None
     assert story.at(2.0).reflector_m[0] < 0.0
-    assert story.lead_s > BOARD.duration_s
+    assert story.lead_s > WAVED_S
     assert story.restings[0].start_s > story.lead_s
     assert np.linalg.norm(story.at(story.lead_s + 1e-3).person.place_m) > 1.0
 
@@ -98,20 +100,15 @@ def test_a_folder_without_ros_has_no_camera_file_either(recording, tmp_path):
 
 def test_a_board_needs_placements_after_it_and_no_islands():
     with pytest.raises(OptionError, match="placements"):
-        SimulationOptions(placements=0, waved_board=BOARD)
+        SimulationOptions(placements=0, waved_board_s=WAVED_S)
     with pytest.raises(OptionError, match="islands"):
-        SimulationOptions(islands=True, waved_board=BOARD)
-    with pytest.raises(OptionError, match="duration_s"):
-        SimulationOptions(waved_board=WavedBoard(duration_s=-1.0))
-
-
-def test_a_board_that_does_not_fit_in_the_picture_is_refused():
-    with pytest.raises(OptionError, match="take a usual one"):
-        set_stage(replace(OPTIONS, waved_board=WavedBoard(5.0, columns=3, rows=40)))
+        SimulationOptions(islands=True, waved_board_s=WAVED_S)
+    with pytest.raises(OptionError, match="waved_board_s"):
+        SimulationOptions(waved_board_s=-1.0)
 
 
 def test_without_a_board_the_story_is_as_before():
-    plain = set_stage(replace(OPTIONS, waved_board=WavedBoard()))
+    plain = set_stage(replace(OPTIONS, waved_board_s=0.0))
     assert plain.waving is None
     assert plain.story.lead_s == 0.0
     assert plain.story.restings[0].start_s < 12.0

@@ -8,7 +8,7 @@ import pytest
 from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import SimulatedScans, SimulationOptions, Surroundings, simulate, simulate_scans
+from calib_core.synthetic import SimulatedRecording, SimulationOptions, Surroundings, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import SimulatedPlacement, set_stage
@@ -34,12 +34,12 @@ def _seen(scans: RadarScans, position_m: np.ndarray) -> float:
     return len(set(scans.scan_of_return()[near].tolist())) / max(len(scans), 1)
 
 
-def _window(session: SimulatedScans, placement: SimulatedPlacement) -> RadarScans:
+def _window(session: SimulatedRecording, placement: SimulatedPlacement) -> RadarScans:
     return session.scans.between(placement.start, placement.end)
 
 
 def test_two_reflectors_stand_at_once_and_are_moved_in_turn():
-    session = simulate_scans(replace(QUIET, reflectors=2))
+    session = simulate(replace(QUIET, reflectors=2))
     placements = session.placements
     for first, second, third in zip(placements, placements[1:], placements[2:], strict=False):
         assert first.start < second.start < first.end < third.start
@@ -49,7 +49,7 @@ def test_two_reflectors_stand_at_once_and_are_moved_in_turn():
 
 
 def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_asked_for():
-    session = simulate_scans(replace(QUIET, placements=6, reflectors=2, reflectors_apart_m=0.7))
+    session = simulate(replace(QUIET, placements=6, reflectors=2, reflectors_apart_m=0.7))
     places_m = np.array([resting.position_m[:2] for resting in session.stage.story.restings])
     ranges_m = np.linalg.norm(places_m, axis=1)
     assert ranges_m[1::2] - ranges_m[::2] == pytest.approx(np.full(3, 0.7))
@@ -57,7 +57,7 @@ def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_aske
 
 
 def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_frames():
-    session = simulate_scans(replace(QUIET, reflectors=2))
+    session = simulate(replace(QUIET, reflectors=2))
     times = [int(click.image_time) for click in session.clicks]
     assert len(set(times)) == 6
     for one, other in ((0, 1), (2, 3), (4, 5)):
@@ -66,10 +66,10 @@ def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_fr
 
 
 def test_a_cart_stands_behind_the_reflector_at_every_placement_and_echoes_more():
-    session = simulate_scans(replace(QUIET, surroundings=CARTS))
+    session = simulate(replace(QUIET, surroundings=CARTS))
     from_world = session.stage.rig.radar_from_world
     for placement, resting in zip(session.placements, session.stage.story.restings, strict=True):
-        cart = (from_world @ cart_position(resting.position_m, CARTS)[None])[0]
+        cart = (from_world @ cart_position(resting.position_m)[None])[0]
         window = _window(session, placement)
         assert np.linalg.norm(cart) - np.linalg.norm(placement.position_radar_m) == pytest.approx(1.0, abs=0.15)
         assert _seen(window, cart) > 0.8
@@ -84,7 +84,7 @@ def test_a_cart_stands_behind_the_reflector_at_every_placement_and_echoes_more()
 
 def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_nothing():
     strong = Surroundings(parked_cars=3, fence=True, strong_target_dbsm=29.0)
-    session = simulate_scans(replace(QUIET, clutter="scene", surroundings=strong))
+    session = simulate(replace(QUIET, clutter="scene", surroundings=strong))
     plain, scene = scene_named("field"), session.stage.scene
     added = replace(scene, solids=scene.solids[len(plain.solids) :])
     places = session.stage.rig.radar_from_world.inverse() @ session.points_radar_m
@@ -96,11 +96,11 @@ def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_n
     assert strongest.rcs_dbsm == 29.0
     assert _seen(session.scans, position) > 0.95
     count = len(session.scans.points_radar_m) / len(session.scans)
-    assert count > len(simulate_scans(replace(QUIET, clutter="scene")).scans.points_radar_m) / len(session.scans) + 5.0
+    assert count > len(simulate(replace(QUIET, clutter="scene")).scans.points_radar_m) / len(session.scans) + 5.0
 
 
 def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns():
-    session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(flickering_targets=5)))
+    session = simulate(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(flickering_targets=5)))
     times_s = np.arange(0.0, session.stage.story.duration_s, 0.1)
     for one in session.stage.flickers:
         shown = np.array([one.shows(float(time_s)) for time_s in times_s])
@@ -112,7 +112,7 @@ def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns():
 
 
 def test_passers_by_cross_the_scene_and_some_stop():
-    session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(passers_by=3)))
+    session = simulate(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(passers_by=3)))
     story = session.stage.story
     assert len(story.passers_by) == 3
     for one, stops in zip(story.passers_by, (False, False, True), strict=True):
@@ -124,19 +124,19 @@ def test_passers_by_cross_the_scene_and_some_stop():
         assert (one.stop_s > 0.0) == stops
         assert np.sign(places[0, 1]) == -np.sign(places[-1, 1])
     moving = np.abs(session.scans.doppler_mps) > 0.2
-    alone = simulate_scans(replace(QUIET, radar_rate_hz=10.0))
+    alone = simulate(replace(QUIET, radar_rate_hz=10.0))
     assert moving.sum() > np.sum(np.abs(alone.scans.doppler_mps) > 0.2) + 50
 
 
 def test_recordings_in_islands_are_short_with_minutes_between():
-    session = simulate_scans(replace(QUIET, islands=True, dropped_share=0.0))
-    for times in (session.stage.scan_times, session.stage.frame_times):
+    session = simulate(replace(QUIET, islands=True))
+    for times in (session.stage.antennas[0].times, session.stage.frame_times):
         gaps_s = np.diff(times.header_ns) / NS_PER_S
         ends = np.flatnonzero(gaps_s > 5.0)
         assert len(ends) == 5
         assert ((gaps_s[ends] > 59.0) & (gaps_s[ends] < 301.0)).all()
         lengths = np.diff(np.concatenate([[0], ends + 1, [len(times)]]))
-        rate_hz = 5.0 if times is session.stage.scan_times else 4.0
+        rate_hz = 5.0 if times is session.stage.antennas[0].times else 4.0
         assert lengths.min() / rate_hz > 1.5
         assert lengths.max() / rate_hz < 15.5
         assert (np.diff(times.receive_ns) > 0).all()
@@ -148,7 +148,7 @@ def test_recordings_in_islands_are_short_with_minutes_between():
 
 
 def test_an_island_begins_with_the_reflector_already_there_if_it_is_shorter_than_the_dwell():
-    session = simulate_scans(replace(QUIET, islands=True, dwell_s=20.0))
+    session = simulate(replace(QUIET, islands=True, dwell_s=20.0))
     first = [window for placement in session.placements if len(window := _window(session, placement))]
     assert all(window.times_ns[-1] - window.times_ns[0] < 15.5 * NS_PER_S for window in first)
 
@@ -158,7 +158,7 @@ def test_several_reflectors_carts_and_passers_by_are_in_the_picture():
         QUIET, reflectors=2, width_px=320, height_px=200, surroundings=Surroundings(companion=True, passers_by=1)
     )
     stage = set_stage(options)
-    renderer = FrameRenderer.of(stage.scene, stage.rig, options.surroundings)
+    renderer = FrameRenderer.of(stage.scene, stage.rig, companion=True)
     moment = stage.story.at(stage.story.restings[1].left_alone_s - 1.0)
     assert [one.index for one in moment.standing] == [0]
     passer = replace(moment.person, x_m=5.0, y_m=-1.0)
@@ -166,7 +166,7 @@ def test_several_reflectors_carts_and_passers_by_are_in_the_picture():
     changed = np.abs(renderer.render(replace(moment, passers_by=(passer,)), person=False) - empty).max(axis=2) > 25.0
     places = [
         *(stage.story.restings[i].position_m - np.array([0.0, 0.0, 0.03]) for i in (0, 1)),
-        *(cart_position(stage.story.restings[i].position_m, options.surroundings) for i in (0, 1)),
+        *(cart_position(stage.story.restings[i].position_m) for i in (0, 1)),
         np.array([passer.x_m, passer.y_m, 1.2]),
     ]
     pixels = stage.rig.camera.project(stage.rig.camera_from_world @ np.array(places))
