@@ -9,15 +9,14 @@ from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.geometry import RigidTransform, larger_eigenvalues
 from calib_core.results import Calibration
+from calib_core.results.calibration import CHI2_95_2, CHI2_95_6
+from calib_core.results.verdict import degrees_of_freedom
 
 MAP_DISTANCES_M = (5.0, 20.0, 60.0)
 """The distances from the camera that are shown; those at which two calibrations are compared as well."""
 
-_CHI2_95_2D = 5.991464547107979
-_CHI2_95_6D = 12.591587243743977
 _SAME_PX = 1e-3
 """A ray that does not project to its own pixel lies where the lens folds back."""
-_FEWEST_DEGREES, _MANY_DEGREES = 1.0, 1e7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,15 +80,12 @@ def pixel_quantile(covariance_quantile: float) -> float:
     Args:
         covariance_quantile: of `Calibration`.
     """
-    if not covariance_quantile > _CHI2_95_6D:
-        return _CHI2_95_2D
+    if not covariance_quantile > CHI2_95_6:
+        return CHI2_95_2
     from scipy.special import fdtri
 
-    low, high = np.log(_FEWEST_DEGREES), np.log(_MANY_DEGREES)
-    for _ in range(60):  # 6 F(6, nu) falls with nu
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > covariance_quantile else (low, middle)
-    return max(_CHI2_95_2D, 2.0 * float(fdtri(2.0, np.exp(high), 0.95)))
+    freedom = degrees_of_freedom(covariance_quantile, least=1.0, most=1e7)
+    return max(CHI2_95_2, 2.0 * float(fdtri(2.0, freedom, 0.95)))
 
 
 def picture_sigma_px(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance) -> float:

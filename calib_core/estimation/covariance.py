@@ -24,12 +24,11 @@ from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.measurement_model import prior_rows
 from calib_core.options import RadarOptions
 from calib_core.radar import polar_from_cartesian
-from calib_core.results.calibration import CovarianceParts
+from calib_core.results.calibration import CHI2_95_6, CovarianceParts
 from calib_core.results.radar_axes import mounting_moves
 from calib_core.results.systematic_errors import LensPrior, SystematicErrorResult, SystematicErrors, shared_out
 
 _LEAST_SHARE = 0.25  # of the plain information that must remain after the correction for uncertain weights
-_CHI2_95_6 = 12.591587243743977
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -320,10 +319,10 @@ def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
         from_pairs: the share of the pose's variance that is the pairs' noise, 0 to 1.
     """
     if degrees_of_freedom <= 0:
-        return _CHI2_95_6
+        return CHI2_95_6
     from scipy.special import fdtri
 
-    return float(_CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - _CHI2_95_6))
+    return float(CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - CHI2_95_6))
 
 
 _LENGTHS_RAD = (np.deg2rad(8.0), np.deg2rad(14.0), np.deg2rad(25.0))

@@ -23,6 +23,7 @@ from calib_core.measurements import MIN_PAIRS, Candidate, Pair, Unpaired
 from calib_core.options import CalibrationOptions, without_systematic_errors
 from calib_core.radar import RadarErrors, polar_from_cartesian
 from calib_core.results import Calibration
+from calib_core.results.calibration import CHI2_95_2, CHI2_95_6
 from calib_core.results.metrics import aed, metrics_of
 
 _FOLDS = 5
@@ -209,9 +210,7 @@ def _distance_px(pair: Pair, calibration: Calibration) -> float:
     return float(away_px[0] if len(away_px) == 1 or np.isnan(away_px).all() else np.nanmin(away_px))
 
 
-_QUANTILE = 12.591587243743977  # the 95 % quantile of chi2 with 6 degrees of freedom
-_OUTSIDE = 5.991464547107979  # the 95 % quantile of chi2 with 2 degrees of freedom
-_MISFIT = 13.815510557964274  # its 99.9 % quantile: no noise of this pair explains it
+_MISFIT = 13.815510557964274  # the 99.9 % quantile of chi2 with 2 degrees of freedom: no noise of this pair explains it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,7 +261,7 @@ def residual_test(pairs: Sequence[Pair], calibration: Calibration) -> ResidualTe
     if not np.isfinite(calibration.firm_covariance).all():
         return ResidualTest(ids, distances_px, none, ~seen, float("nan"), 0, float("nan"))
     jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, points_radar_m)
-    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / _QUANTILE)  # tails than a normal error's
+    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / CHI2_95_6)  # tails than a normal error's
     covariance = calibration.firm_covariance * heavier
     return _tested(ids, distances_px, residuals_px, residual_covariances(model), jacobian, covariance)
 
@@ -301,4 +300,4 @@ def _tested(
     chi2 = float(residual_px @ np.linalg.solve(together_px2, residual_px)) if len(kept) else float("nan")
     freedom = 2 * len(kept)
     p_value = float(chdtrc(freedom, chi2)) if len(kept) else float("nan")
-    return ResidualTest(ids, distances_px, squared > _OUTSIDE, squared > _MISFIT, chi2, freedom, p_value)
+    return ResidualTest(ids, distances_px, squared > CHI2_95_2, squared > _MISFIT, chi2, freedom, p_value)

@@ -22,6 +22,8 @@ from calib_core.results.systematic_errors import (
     rescaled,
 )
 
+CHI2_95_2, CHI2_95_3, CHI2_95_6 = 5.991464547107979, 7.814727903251178, 12.591587243743977
+"""95 % quantiles of chi-squared with 2, 3 and 6 degrees of freedom."""
 _ROUNDING = 1e-12
 
 
@@ -236,7 +238,7 @@ class Calibration:
     warnings: tuple[DataWarning, ...]
     options: CalibrationOptions
     noise_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    covariance_quantile: float = 12.591587243743977
+    covariance_quantile: float = CHI2_95_6
     iterative_px: float = float("nan")
     sqpnp_px: float = float("nan")
     angle_map: AngleMap | None = None

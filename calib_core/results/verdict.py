@@ -29,8 +29,6 @@ from calib_core.results.calibration import Calibration
 from calib_core.results.systematic_errors import scaled_px
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
-_LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
-_HALVINGS = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,19 +79,11 @@ def stated_error(calibration: Calibration) -> StatedError:
     )
 
 
-def degrees_of_freedom(quantile_95: float) -> float:
+def degrees_of_freedom(quantile_95: float, *, least: float = 0.5, most: float = 1e5) -> float:
     """Return nu, the degrees of freedom that the quantile of the 6 parameters states: 6 F(6, nu) is at most that with 95 %."""
-    from scipy.special import fdtri
+    from scipy.special import fdtridfd
 
-    if not quantile_95 > 6.0 * fdtri(6.0, _MOST_FREEDOM, 0.95):
-        return _MOST_FREEDOM
-    if quantile_95 >= 6.0 * fdtri(6.0, _LEAST_FREEDOM, 0.95):
-        return _LEAST_FREEDOM
-    low, high = np.log(_LEAST_FREEDOM), np.log(_MOST_FREEDOM)
-    for _ in range(_HALVINGS):  # 6 F(6, nu) falls with nu; importing scipy.optimize would take a third of a second
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > quantile_95 else (low, middle)
-    return float(np.exp(high))
+    return max(least, min(most, float(fdtridfd(6.0, 0.95, quantile_95 / 6.0))))  # of NaN, the most
 
 
 def _radius(covariance: np.ndarray, freedom: float) -> float:

@@ -10,6 +10,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
+from calib_core.results.calibration import CHI2_95_2, CHI2_95_3, CHI2_95_6
 from calib_core.words import told
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import RecordedView
@@ -43,7 +44,6 @@ _AGAINST = (230, 120, 230)
 _CAMERA = (87, 182, 242)
 _FRUSTUM_SHARE = 0.06
 _CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 49)), np.sin(np.linspace(0, 2 * np.pi, 49))])
-_CHI2_95_2D, _CHI2_95_3D, _CHI2_95_6D = 5.991464547107979, 7.814727903251178, 12.591587243743977
 
 
 def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
@@ -99,7 +99,7 @@ def _log_camera_position(stream: rr.RecordingStream, calibration: Calibration) -
         return
     pose: RigidTransform = calibration.camera_from_radar
     moves = camera_position_jacobian(pose)
-    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / _CHI2_95_6D)
+    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / CHI2_95_6)
     position_m2 = (moves @ covariance @ moves.T)[None] * heavier
     centre = pose.inverse().translation_m[None]
     stream.log(
@@ -143,7 +143,7 @@ def ellipse_strips(pairs: Sequence[PairResult]) -> list[Points2]:
         covariance = pair.expected_covariance_px2
         if np.isfinite(covariance).all() and np.isfinite(pair.projected_px).all():
             squares, axes = np.linalg.eigh((covariance + covariance.T) / 2.0)
-            half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_2D)
+            half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * CHI2_95_2)
             strips.append(pair.projected_px + (half_axes @ _CIRCLE).T + HALF_PIXEL_PX)
     return strips
 
@@ -157,7 +157,7 @@ def _ellipsoids(
 
     return rr.Ellipsoids3D(
         centers=centres_m,
-        half_sizes=np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_3D),
+        half_sizes=np.sqrt(np.maximum(squares, 0.0) * CHI2_95_3),
         quaternions=Rotation.from_matrix(axes).as_quat(),
         colors=colours,
         line_radii=rr.Radius.ui_points(0.6),

@@ -12,12 +12,12 @@ from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsol
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
+from calib_core.results.calibration import CHI2_95_2
 from calib_core.words import in_sentences
 from cocalib.session import RecordingFacts, Session
 from cocalib.view.model import ClickRow, ClickState, Ellipse
 from cocalib.view.wording import plain, position_words
 
-_CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
 # Pixels are rounded to steps of at most 1 % of the pair's ellipse and a quarter of a pixel, which cannot be seen: with many
 # clicks, one more then leaves most pairs as they are, and only the others are sent to the page.
 _SHARE, _FINEST_PX, _COARSEST_PX = 0.01, 2.0**-7, 0.25
@@ -121,7 +121,7 @@ def ellipses_of(covariances_px2: Sequence[np.ndarray]) -> list[Ellipse | None]:
     known: Flags = np.all(np.isfinite(covariances), axis=(1, 2))
     symmetric = (covariances[known] + covariances[known].swapaxes(1, 2)) / 2.0
     squares, axes = np.linalg.eigh(symmetric)
-    minor_and_major = np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_2D)
+    minor_and_major = np.sqrt(np.maximum(squares, 0.0) * CHI2_95_2)
     angles = np.round(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]) % np.pi, _DECIMALS_RAD)
     ellipses: list[Ellipse | None] = [None] * len(covariances)
     for place, (minor, major), angle in zip(

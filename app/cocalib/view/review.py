@@ -13,12 +13,12 @@ from calib_core.interchange import CalibrationFile, ImportedCalibration, compare
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
+from calib_core.results.calibration import CHI2_95_2
 from calib_core.words import Words, join, named, said_of, say, words
 from cocalib.session import History
 from cocalib.view.model import Figure
 from cocalib.view.wording import direction_words, plain, sentence
 
-_CHI2_95_2D = 5.991464547107979
 _FEWEST_BINS, _MOST_BINS = 8, 24
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
@@ -122,7 +122,7 @@ def _words(calibration: Calibration) -> Words:
     sigmas = sigmas[np.isfinite(sigmas)]
     said: list[Words | str] = ["This method has no noise model: no distribution is expected."]
     if len(sigmas):
-        inside = int((sigmas**2 <= _CHI2_95_2D).sum())
+        inside = int((sigmas**2 <= CHI2_95_2).sum())
         said = [
             f"{inside} of {len(sigmas)} agreeing clicks are inside their 95 % ellipse ({plain(0.95 * len(sigmas))} expected)."
         ]

@@ -12,6 +12,7 @@ from calib_core.geometry import OPTICAL_FROM_LINK, RigidTransform
 from calib_core.options import NoiseOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
+from calib_core.results.calibration import CHI2_95_3
 from cocalib.colours import Colour
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ LIGHT = Palette(
     still=(20, 120, 190), moving=(205, 85, 15), window=(70, 85, 100), ray=(20, 30, 40), next=(10, 90, 160),
     solved=(10, 111, 179), rings=(140, 152, 165), cells=(221, 226, 232),
 )  # fmt: skip
-_CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28
 _DASH_STEPS = 3
 
@@ -97,7 +97,7 @@ def ellipsoids(
     ) * np.array(noise_scale[1:])
     covariances = covariance_from_sigma_polar(points_radar_m, np.broadcast_to(sigma, points_radar_m.shape))
     squares, axes = np.linalg.eigh(covariances)
-    half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_3D)[:, None, :]
+    half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * CHI2_95_3)[:, None, :]
     angles = np.linspace(0.0, 2.0 * np.pi, _CIRCLE + 1)
     segments = []
     for first, second in ((0, 1), (0, 2), (1, 2)):
