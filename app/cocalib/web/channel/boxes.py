@@ -55,18 +55,20 @@ class BoxDesk:
         """Send the present figures to a page that has just opened."""
         outbox.put(encode(self._panel), kind="acc")
 
-    async def obey(self, command: BoxesWanted | MovingBoxesWanted) -> None:
-        """Take the boxes of a file, or begin to look for what moves.
+    async def take(self, wanted: BoxesWanted) -> None:
+        """Take the boxes of a file.
 
         Raises:
             InputError: the file cannot be read, is of no known format, or belongs to another recording.
         """
-        if isinstance(command, BoxesWanted):
-            boxes = await asyncio.get_running_loop().run_in_executor(self._executor, self._read, command)
-            if self._finding is not None:
-                self._finding.cancel()
-            self._take(boxes)
-        elif self._finding is None or self._finding.done():
+        boxes = await asyncio.get_running_loop().run_in_executor(self._executor, self._read, wanted)
+        if self._finding is not None:
+            self._finding.cancel()
+        self._take(boxes)
+
+    def find(self, _wanted: MovingBoxesWanted) -> None:
+        """Begin to look for what moves."""
+        if self._finding is None or self._finding.done():
             self._finding = asyncio.get_running_loop().create_task(self._find())
 
     def follow(self) -> None:

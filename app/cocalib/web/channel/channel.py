@@ -1,10 +1,11 @@
 """One page's channel: reads its messages and answers them in order, without waiting for other pages."""
 
 import asyncio
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol, get_args
 
 import numpy as np
 
@@ -34,7 +35,9 @@ from cocalib.web.messages import (
     Hello,
     ImportWanted,
     Incoming,
-    LensRequest,
+    LensCalibrate,
+    LensCancel,
+    LensUse,
     MovingBoxesWanted,
     OpeningCommand,
     Problem,
@@ -82,6 +85,23 @@ class Channel:
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
+        self._handlers: Mapping[type, Callable[[Any], Awaitable[None] | None]] = {
+            Hello: self._greetings.give,
+            ViewWanted: self._views.give,
+            FrameWanted: self._frames.give,
+            CursorMoved: self._move,
+            ViewpointWanted: self._look_from,
+            SnapWanted: self._snap,
+            ImportWanted: self._import,
+            ProposingSwitch: hub.proposing.switch,
+            BoxesWanted: hub.boxes.take,
+            MovingBoxesWanted: hub.boxes.find,
+            LensCalibrate: hub.lens.calibrate,
+            LensCancel: hub.lens.cancel,
+            LensUse: hub.lens.use,
+            **dict.fromkeys(get_args(ReviewRequest), self._review.give),
+        }
+        """What is done with each command; every other one is a step of the session."""
 
     async def run(self, socket: Socket) -> None:
         """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
@@ -148,22 +168,11 @@ class Channel:
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
-        if isinstance(command, FrameWanted | Hello | ViewWanted | ReviewRequest):
-            self._give(command)
-        elif isinstance(command, CursorMoved):
-            self._move(command)
-        elif isinstance(command, ViewpointWanted | ProposingSwitch):
-            self._set(command)
-        elif isinstance(command, BoxesWanted | MovingBoxesWanted):
-            await self._hub.boxes.obey(command)
-        elif isinstance(command, SnapWanted):
-            self.outbox.put(encode(await self._snapped(command)))
-        elif isinstance(command, LensRequest):
-            await self._hub.lens.obey(command)
-        else:
-            await self._change(command)
+        doing = self._handlers.get(type(command), self._step)(command)
+        if doing is not None:
+            await doing
 
-    async def _snapped(self, wanted: SnapWanted) -> Snapped:
+    async def _snap(self, wanted: SnapWanted) -> None:
         """Search for an apex in one frame, or in those of its placement.
 
         Raises:
@@ -171,38 +180,27 @@ class Channel:
         """
         hub = self._hub
         if wanted.over_dwell:
-            return await hub.proposing.averaged(wanted)
-        return await snapped(wanted, hub.moments, hub.frames, hub.executor)
-
-    def _set(self, command: ViewpointWanted | ProposingSwitch) -> None:
-        """Change what the page looks at, or whether there are proposals."""
-        if isinstance(command, ProposingSwitch):
-            self._hub.proposing.switch(command)
-        elif self.scene is not None:
-            self.scene.look_from(command.viewpoint)
-
-    def _give(self, command: FrameWanted | Hello | ViewWanted | ReviewRequest) -> None:
-        """Hand over what a newer request of the same kind supersedes."""
-        if isinstance(command, FrameWanted):
-            self._frames.give(command)
-        elif isinstance(command, Hello):
-            self._greetings.give(command)
-        elif isinstance(command, ViewWanted):
-            self._views.give(command)
+            answer = await hub.proposing.averaged(wanted)
         else:
-            self._review.give(command)
+            answer = await snapped(wanted, hub.moments, hub.frames, hub.executor)
+        self.outbox.put(encode(answer))
 
-    async def _change(self, command: Step | ImportWanted) -> None:
+    def _look_from(self, wanted: ViewpointWanted) -> None:
+        if self.scene is not None:
+            self.scene.look_from(wanted.viewpoint)
+
+    async def _import(self, wanted: ImportWanted) -> None:
+        await self._change(partial(self._hub.workspace.import_clicks, wanted.text, wanted.name))
+
+    async def _step(self, step: Step) -> None:
+        await self._change(partial(self._hub.workspace.dispatch, step))
+
+    async def _change(self, change: Callable[[], object]) -> None:
         """Change the session, off the event loop.
 
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
-        workspace = self._hub.workspace
-        if isinstance(command, ImportWanted):
-            change = partial(workspace.import_clicks, command.text, command.name)
-        else:
-            change = partial(workspace.dispatch, command)
         await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
 
     def _view_text(self) -> str:

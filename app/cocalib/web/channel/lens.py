@@ -34,10 +34,10 @@ from cocalib.web.messages import (
     LensCalibrate,
     LensCamera,
     LensCancel,
-    LensRequest,
     LensResult,
     LensState,
     LensTrial,
+    LensUse,
     LensViewRow,
     Outgoing,
     encode,
@@ -88,22 +88,29 @@ class LensDesk:
         if self._workspace.camera is not self._shown_camera:
             self._tell(self._present(), "lens")
 
-    async def obey(self, request: LensRequest) -> None:
-        """Do what a page asks for.
+    def calibrate(self, wanted: LensCalibrate) -> None:
+        """Begin to calibrate the lens.
 
         Raises:
-            CalibrationError: it cannot be done, in words.
+            InputError: there is no such board.
         """
-        if isinstance(request, LensCalibrate):
-            self._job.start(self._pictures, _board(request), request.model)
-        elif isinstance(request, LensCancel):
-            self._job.cancel()
-        else:
-            lens = self._job.snapshot.lens
-            if lens is None:
-                raise InputError("there is no calibrated lens to use yet; calibrate it first")
-            step = IntrinsicsChosen(ChosenIntrinsics.of(lens.camera, _about(lens)))
-            await asyncio.get_running_loop().run_in_executor(None, partial(self._workspace.dispatch, step))
+        self._job.start(self._pictures, _board(wanted), wanted.model)
+
+    def cancel(self, _wanted: LensCancel) -> None:
+        """Stop calibrating."""
+        self._job.cancel()
+
+    async def use(self, _wanted: LensUse) -> None:
+        """Solve with the calibrated lens.
+
+        Raises:
+            InputError: there is none yet.
+        """
+        lens = self._job.snapshot.lens
+        if lens is None:
+            raise InputError("there is no calibrated lens to use yet; calibrate it first")
+        step = IntrinsicsChosen(ChosenIntrinsics.of(lens.camera, _about(lens)))
+        await asyncio.get_running_loop().run_in_executor(None, partial(self._workspace.dispatch, step))
 
     async def close(self) -> None:
         """Stop the calibration, and tell the pages nothing more."""

@@ -13,7 +13,7 @@ from calib_core.measurements import TimeNs
 from cocalib.option_changes import changes_from_tree
 from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
 from cocalib.session.events import Id
-from cocalib.web.messages.lens_messages import LensRequest
+from cocalib.web.messages.lens_messages import LensCalibrate, LensCancel, LensUse
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 
 MAX_TEXT_BYTES = 4 * 1024 * 1024
@@ -174,7 +174,9 @@ Command: TypeAlias = (
     | ViewpointWanted
     | ImportWanted
     | ReviewRequest
-    | LensRequest
+    | LensCalibrate
+    | LensCancel
+    | LensUse
     | ProposingSwitch
     | SnapWanted
     | BoxesWanted

@@ -36,9 +36,6 @@ class LensUse(_Form, frozen=True, tag="lens_use"):
     """Solve with the calibrated lens from now on; a step of the session that can be undone."""
 
 
-LensRequest: TypeAlias = LensCalibrate | LensCancel | LensUse
-
-
 @dataclass(frozen=True, slots=True)
 class LensCamera:
     """A camera's intrinsics, as a table.

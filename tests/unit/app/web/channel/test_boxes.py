@@ -56,7 +56,10 @@ def at_desk(
         desk.follow()
         for command in commands:
             before = len(told)
-            await desk.obey(command)
+            if isinstance(command, BoxesWanted):
+                await desk.take(command)
+            else:
+                desk.find(command)
             async with asyncio.timeout(40):
                 while not any(is_answer(message) for message in told[before:]):
                     await asyncio.sleep(0.005)

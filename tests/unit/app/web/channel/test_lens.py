@@ -77,15 +77,15 @@ async def until_done(told: list[Outgoing]) -> LensState:
 def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
     async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match="no calibrated lens"):
-            await desk.obey(LensUse())
+            await desk.use(LensUse())
         with pytest.raises(InputError, match="calibrate the lens first"):
             desk.camera_yaml(calibrated=True)
         assert "600" in desk.camera_yaml(calibrated=False)
-        await desk.obey(WANTED)
+        desk.calibrate(WANTED)
         state = await until_done(told)
         assert (state.result, state.in_use, state.chosen) == (1, False, False)
         assert state.intrinsics.about == "/camera_info", "nothing is used before the person says so"
-        await desk.obey(LensUse())
+        await desk.use(LensUse())
         desk.follow()
         now = told[-1]
         assert (now.in_use, now.chosen) == (True, True)
@@ -116,8 +116,8 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
 def test_a_board_that_cannot_be_is_refused_in_words(workspace, wanted, said):
     async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match=said):
-            await desk.obey(wanted)
-        await desk.obey(LensCancel())
+            desk.calibrate(wanted)
+        desk.cancel(LensCancel())
         assert told == []
 
     at_desk(workspace, visit)
