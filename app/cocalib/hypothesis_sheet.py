@@ -40,7 +40,7 @@ class FrameWithReturns:
     camera: "Camera"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Offer:
     """One pose that the numbers in a file can mean.
 

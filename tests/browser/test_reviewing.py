@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calib_core.recordings import Recording
-from cocalib.opening.opened import reference_from
+from cocalib.opening.opened import GivenCalibration
 from tests.browser.driving import Driver
 from tests.serving import serving
 
@@ -22,9 +22,11 @@ def test_a_calibration_is_shown_checked_and_compared(
     rows = np.hstack([true["rotation"], np.reshape(true["translation_m"], (3, 1))])
     file.write_text("\n".join(" ".join(repr(float(value)) for value in row) for row in rows))
     camera = sample.camera()
-    with serving(
-        sample, tmp_path / "session", camera=camera, name="sample", reference=reference_from(file, camera), token="test"
-    ) as (running, _):
+    reference = GivenCalibration.read(file).shown(camera).reference
+    with serving(sample, tmp_path / "session", camera=camera, name="sample", reference=reference, token="test") as (
+        running,
+        _,
+    ):
         page = open_page(running.url)
         assert page.text("#status-text").startswith("Showing the calibration from factory.txt; click reflectors")
         page.until("__cocalib.state.overlay.returns.length > 0")

@@ -1,6 +1,7 @@
 """Open what was chosen: the recording, its intrinsics, its session, and the calibration to show until clicks give a new one."""
 
 import dataclasses
+import functools
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -8,16 +9,17 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import sleep
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 import calib_core.recordings as recordings
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import adopted_calibration, calibration_bytes, read_any
+from calib_core.interchange import ImportedCalibration, adopted_calibration, calibration_bytes, read_any
 from calib_core.interchange.cameras.camera_format import refuse_another_size
-from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of, likely_ones
-from calib_core.interchange.hypotheses.reading import as_imported, picked, read_unstated
+from calib_core.interchange.hypotheses.found_poses import FoundPose
+from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of, likely_ones
+from calib_core.interchange.hypotheses.reading import UnstatedFile, as_imported, picked, read_unstated
 from calib_core.interchange.own.clicks_json import read_clicks_file
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
@@ -51,13 +53,8 @@ from cocalib.view import Reference
 from cocalib.web.messages import SessionOffer
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 
-if TYPE_CHECKING:
-    from calib_core.interchange import ImportedCalibration
-    from calib_core.interchange.hypotheses.found_poses import FoundPose
-    from calib_core.interchange.hypotheses.ranking import Hypothesis
-    from calib_core.interchange.hypotheses.reading import UnstatedFile
-
-
+_Ranked: TypeAlias = Callable[[str], tuple[Hypothesis, ...]]
+"""Ranks the meanings of the numbers at a place of a file, once."""
 _LOOK_EVERY_S = 0.2
 _NOTHING_PICKED = MeaningPick()
 _MOST_POSES, _MOST_OFFERS = 4, 12
@@ -114,7 +111,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
     if choice.options is not None and choice.options != CalibrationOptions():
         workspace.dispatch(OptionsChanged.of(choice.options))
     if choice.clicks is not None and clicks is not None:
-        _import_clicks(workspace, choice.clicks, clicks)
+        _import_clicks(workspace, choice.clicks.source, clicks)
     return Opened(recording, workspace)
 
 
@@ -168,12 +165,11 @@ def _require_unmoved(choice: Choice) -> None:
 
 
 def _workspace(choice: Choice, recording: Recording) -> Workspace:
-    camera = _camera(choice, recording)
-    calibration = choice.calibration_file
     with part_of_choice("calibration"):
-        shown = reference_from(calibration, camera, choice.pick) if calibration and camera else None
-        meaning = meaning_of(calibration, camera, choice.pick) if calibration and camera else None
-    reference = shown if isinstance(shown, Reference) else None
+        calibration = None if choice.calibration_file is None else GivenCalibration.read(choice.calibration_file)
+    camera = _camera(choice, recording, calibration)
+    with part_of_choice("calibration"):
+        shown = calibration.shown(camera, choice.pick) if calibration and camera else None
     facts = recording_facts(recording, choice.title)
     from_calibration = camera is not None and choice.camera_file is None and recording.camera() is None
     with part_of_choice("session"):
@@ -184,22 +180,22 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
             camera=camera,
             session_folder=found.path,
             name=choice.title,
-            reference=reference,
+            reference=shown.reference if shown else None,
             warnings=(
                 *found.warnings,
                 *([] if copied is None else [copied.about]),
-                *(about_calibration(calibration, shown, meaning) if len(recording.image_times) else ()),
+                *(about_calibration(calibration.name, shown) if calibration else ()),
             ),
             camera_file=choice.camera_file,
-            intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
+            intrinsics=calibration.name if from_calibration and calibration else "",
         )
-    workspace.open_meaning = meaning
+    workspace.open_meaning = shown.meaning if shown else None
     if copied is not None and copied.clicks and workspace.restored.steps == 0:
         workspace.dispatch(ClicksImported.of(copied.clicks))
     return workspace
 
 
-def _camera(choice: Choice, recording: Recording) -> Camera | None:
+def _camera(choice: Choice, recording: Recording, calibration: "GivenCalibration | None") -> Camera | None:
     """Return the intrinsics: from the file, else from the recording, else from the calibration to show; None if there are none.
 
     Raises:
@@ -207,11 +203,10 @@ def _camera(choice: Choice, recording: Recording) -> Camera | None:
     """
     if not len(recording.image_times):
         return None
-    calibration = choice.calibration_file
     if choice.camera_file is None and calibration is not None and recording.camera() is None:
         picture = recording.image_bytes(0)
         with part_of_choice("calibration"):
-            found = camera_in(calibration, picture.width_px, picture.height_px)
+            found = calibration.camera((picture.width_px, picture.height_px))
         if found is not None:
             return found
     if choice.camera_file is None:
@@ -228,23 +223,21 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     """
     if given is None:
         return None
-    clicks = read_clicks_file(given.text, source=given.source).clicks
-    return clicks_at_frames(clicks, recording.image_times, source=given.source, others=recording.other_image_times)
+    file, source = read_clicks_file(given.text, source=given.source), given.source
+    found = clicks_at_frames(file.clicks, recording.image_times, source=source, others=recording.other_image_times)
+    if file.unconfirmed is None:
+        return found
+    note = f"{source}: nobody confirmed {len(file.unconfirmed.ids)} of these clicks: look at each"
+    return dataclasses.replace(found, notes=(*found.notes, note))
 
 
-def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFrames) -> None:
+def _import_clicks(workspace: Workspace, source: str, found: ClicksAtFrames) -> None:
     """Start a new session with the clicks of a file; one that has steps already goes on as it is."""
     if workspace.restored.steps > 0:
-        print(f"Continuing the existing session; {given.source} was not imported (start over with --fresh)")
+        print(f"Continuing the existing session; {source} was not imported (start over with --fresh)")
         return
     for line in found.notes:
         print(f"note: {line}", file=sys.stderr)
-    unconfirmed = read_clicks_file(given.text, source=given.source).unconfirmed
-    if unconfirmed is not None:
-        print(
-            f"note: {given.source}: nobody confirmed {len(unconfirmed.ids)} of these clicks: look at each",
-            file=sys.stderr,
-        )
     workspace.dispatch(ClicksImported.of(found.clicks))
 
 
@@ -381,7 +374,7 @@ def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path 
     return SessionOffer(str(folder), len(found.clicks), found.recording, continues, choice.session_plan)
 
 
-def camera_of(found: "ImportedCalibration", path: Path, size_px: tuple[int, int]) -> Camera | None:
+def camera_of(found: ImportedCalibration, path: Path, size_px: tuple[int, int]) -> Camera | None:
     """Return the camera of a calibration for pictures of a size; None if it has none.
 
     Raises:
@@ -395,93 +388,104 @@ def camera_of(found: "ImportedCalibration", path: Path, size_px: tuple[int, int]
         raise InputError(f"{path}: {error}; give the intrinsics with --camera FILE") from None
 
 
-def camera_in(path: Path, width_px: int, height_px: int) -> Camera | None:
-    """Return the camera in a calibration file if it has this image size, else None.
+@dataclass(frozen=True, slots=True)
+class ShownCalibration:
+    """A calibration to show with a recording.
 
-    Raises:
-        InputError: the file contains no calibration.
+    Attributes:
+        reference: it; None until a person picks what it means.
+        meaning: what it can mean, with the meaning that is taken; None if its file says what it means.
     """
-    data = calibration_bytes(path)
-    file = read_unstated(data, str(path))
-    if file is not None:
-        sized = None if file.camera is None or file.camera.size_px is None else file.camera
-        camera = sized.camera(image_size_px=None, source=str(path)) if sized else None
-    else:
-        camera = camera_of(read_any(data, str(path)), path, (width_px, height_px))
-    fits = camera is not None and (camera.width_px, camera.height_px) == (width_px, height_px)
-    return camera if fits else None
+
+    reference: Reference | None
+    meaning: OpenMeaning | None = None
 
 
-def reference_from(path: Path, camera: Camera | None, pick: MeaningPick = _NOTHING_PICKED) -> Reference | OpenMeaning:
-    """Return the calibration in a file, to be shown with the recording's camera; or what it can mean, if it does not say.
+@dataclass(frozen=True, slots=True)
+class GivenCalibration:
+    """A calibration file, read once.
 
-    Args:
+    Attributes:
         path: of the file.
-        camera: the recording's.
-        pick: what a person picked.
-
-    Raises:
-        InputError: it contains no calibration, contradicts itself or fails its own check point.
+        content: what it states, or numbers of which it does not say what they mean.
     """
-    if camera is None:
-        raise InputError(f"{path}: showing this calibration needs intrinsics; give --camera FILE")
-    data, source, name = calibration_bytes(path), str(path), name_text(path.name)
-    file = read_unstated(data, source)
-    if file is None:
-        return Reference(name, adopted_calibration(read_any(data, source), source, camera=camera))
-    chosen = _chosen(file, pick, source)
-    if chosen is None:
-        return _open_meaning(file, name, camera)
-    pose, hypothesis = chosen
-    found = as_imported(file, pose, hypothesis, by_hand=bool(pick.meaning))
-    return Reference(name, adopted_calibration(found, source, camera=camera))
+
+    path: Path
+    content: ImportedCalibration | UnstatedFile
+
+    @classmethod
+    def read(cls, path: Path) -> "GivenCalibration":
+        """Read a file.
+
+        Raises:
+            InputError: it contains no calibration.
+        """
+        data = calibration_bytes(path)
+        return cls(path, read_unstated(data, str(path)) or read_any(data, str(path)))
+
+    @property
+    def name(self) -> str:
+        """Its name, to be shown."""
+        return name_text(self.path.name)
+
+    def camera(self, size_px: tuple[int, int]) -> Camera | None:
+        """Return its camera if it has this image size, else None.
+
+        Raises:
+            InputError: its matrix is not a camera's, or is that of pictures of another size.
+        """
+        if isinstance(self.content, UnstatedFile):
+            sized = None if self.content.camera is None or self.content.camera.size_px is None else self.content.camera
+            camera = sized.camera(image_size_px=None, source=str(self.path)) if sized else None
+        else:
+            camera = camera_of(self.content, self.path, size_px)
+        return camera if camera is not None and (camera.width_px, camera.height_px) == size_px else None
+
+    def shown(self, camera: Camera, pick: MeaningPick = _NOTHING_PICKED) -> ShownCalibration:
+        """Return it as shown with the recording's camera; or what it can mean, if it does not say.
+
+        Args:
+            camera: the recording's.
+            pick: what a person picked.
+
+        Raises:
+            InputError: it contradicts itself, fails its own check point, or has nothing of what was picked.
+        """
+        source, meaning, stated = str(self.path), None, self.content
+        if isinstance(stated, UnstatedFile):
+            unstated = stated
+            ranked = functools.cache(lambda place: hypotheses_of(unstated.pose_at(place)))
+            chosen = _chosen(unstated, pick, source, ranked)
+            meaning = _open_meaning(unstated, self.name, camera, chosen, ranked)
+            if chosen is None:
+                return ShownCalibration(None, meaning)
+            stated = as_imported(unstated, *chosen, by_hand=bool(pick.meaning))
+        return ShownCalibration(Reference(self.name, adopted_calibration(stated, source, camera=camera)), meaning)
 
 
-def meaning_of(path: Path, camera: Camera, pick: MeaningPick = _NOTHING_PICKED) -> OpenMeaning | None:
-    """Return what a file can mean that does not say it, with the meaning that is taken; None if it says what it means.
-
-    Args:
-        path: of the file.
-        camera: the recording's.
-        pick: what a person picked.
-
-    Raises:
-        InputError: it contains no calibration, or nothing of what was picked.
-    """
-    file = read_unstated(calibration_bytes(path), str(path))
-    if file is None:
-        return None
-    chosen = _chosen(file, pick, str(path))
-    shown = None if chosen is None else Offer(chosen[0].place, chosen[1])
-    return _open_meaning(file, name_text(path.name), camera, shown)
-
-
-def about_calibration(
-    path: Path | None, shown: Reference | OpenMeaning | None, meaning: OpenMeaning | None
-) -> tuple[DataWarning, ...]:
+def about_calibration(name: str, shown: ShownCalibration | None) -> tuple[DataWarning, ...]:
     """Return what the user must know about the calibration to show: why it is not shown, or what is assumed about it.
 
     Args:
-        path: of its file; None if there is none.
-        shown: the calibration, or what it can mean; None without intrinsics.
-        meaning: what it can mean, if its file does not say: a person can pick again.
+        name: of its file.
+        shown: the calibration; None without intrinsics.
     """
-    if path is None:
-        return ()
-    name = name_text(path.name)
     if shown is None:
         message = f"{name} is not shown, since there are no camera intrinsics"
         hint = "drop the camera file on the page, or give --camera FILE"
         return (DataWarning.reported("calibration-not-shown", message, hint),)
-    if isinstance(shown, OpenMeaning):
+    if shown.reference is None:
         message = f"{name} is not shown, since it does not state what its numbers mean"
         return (DataWarning.reported("calibration-ambiguous", message, "pick a meaning, each drawn over a frame"),)
+    meaning = shown.meaning
     if meaning is not None and meaning.shown is not None:
         words = meaning.offers[meaning.shown].hypothesis.meanings[0].words
         message = f"{name} does not state what its numbers mean; it is shown as if it {words}"
         hint = "if returns lie beside what they come from, pick another meaning; clicks on the reflector test it"
         return (DataWarning.reported("calibration-picked", message, hint),)
-    notes = [str(told(warning).message) for warning in shown.calibration.warnings if warning.code == "assumed"]
+    notes = [
+        str(told(warning).message) for warning in shown.reference.calibration.warnings if warning.code == "assumed"
+    ]
     if not notes:
         return ()
     hint = "returns that lie beside what they come from show that it is wrong; clicks on the reflector test it"
@@ -490,7 +494,7 @@ def about_calibration(
     )
 
 
-def _chosen(file: "UnstatedFile", pick: MeaningPick, source: str) -> "tuple[FoundPose, Hypothesis] | None":
+def _chosen(file: UnstatedFile, pick: MeaningPick, source: str, ranked: _Ranked) -> tuple[FoundPose, Hypothesis] | None:
     """Return the meaning that was picked, or else the only plausible one; None if there are several.
 
     Raises:
@@ -499,25 +503,29 @@ def _chosen(file: "UnstatedFile", pick: MeaningPick, source: str) -> "tuple[Foun
     if not pick.meaning and len(file.poses) > 1 and len(_of_radars(file)) != 1:
         return None
     pose = file.pose_at(pick.place or None)
-    hypotheses = hypotheses_of(pose)
+    hypotheses = ranked(pose.place)
     chosen = picked(hypotheses, pick.meaning, source) if pick.meaning else clear_one(pose, hypotheses)
     return None if chosen is None else (pose, chosen)
 
 
-def _of_radars(file: "UnstatedFile") -> "list[FoundPose]":
+def _of_radars(file: UnstatedFile) -> list[FoundPose]:
     return [pose for pose in file.poses if pose.hints.names_radar]
 
 
-def _open_meaning(file: "UnstatedFile", name: str, camera: Camera, shown: Offer | None = None) -> OpenMeaning:
+def _open_meaning(
+    file: UnstatedFile,
+    name: str,
+    camera: Camera,
+    chosen: tuple[FoundPose, Hypothesis] | None,
+    ranked: _Ranked,
+) -> OpenMeaning:
     """Return what a person can pick from: the meaning that is shown is always among them."""
-    ranked = [(pose, hypotheses_of(pose)) for pose in (_of_radars(file) or file.poses)[:_MOST_POSES]]
-    most = _MOST_OFFERS // len(ranked)
-    offers = [Offer(pose.place, one) for pose, hypotheses in ranked for one in likely_ones(hypotheses)[:most]]
-    if shown is None:
+    poses = (_of_radars(file) or file.poses)[:_MOST_POSES]
+    most = _MOST_OFFERS // len(poses)
+    offers = [Offer(pose.place, one) for pose in poses for one in likely_ones(ranked(pose.place))[:most]]
+    if chosen is None:
         return OpenMeaning(name, tuple(offers), camera)
-    same = [
-        number
-        for number, one in enumerate(offers)
-        if (one.place, one.hypothesis.key) == (shown.place, shown.hypothesis.key)
-    ]
-    return OpenMeaning(name, tuple(offers if same else [shown, *offers]), camera, shown=same[0] if same else 0)
+    shown = Offer(chosen[0].place, chosen[1])
+    if shown not in offers:
+        offers.insert(0, shown)
+    return OpenMeaning(name, tuple(offers), camera, shown=offers.index(shown))

@@ -26,7 +26,7 @@ from calib_core.measurements import (
 )
 from calib_core.radar import RadarErrors
 from cocalib.evaluation.evaluating import check_clicks
-from cocalib.opening.opened import camera_in, reference_from
+from cocalib.opening.opened import GivenCalibration
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.view import Reference, shown_calibration, view
 from cocalib.web.radar_sight import overlay_of
@@ -138,16 +138,15 @@ def test_what_cannot_be_adopted_is_refused_with_a_clear_error(file, tmp_path):
     swapped = export(dataclasses.replace(file, calibration=inverse), "tf2").data.decode()
     path.write_text("\n".join(text.splitlines()[:-3] + swapped.splitlines()[-3:]))
     with pytest.raises(InputError, match="swapped"):
-        reference_from(path, calibration.camera)
+        GivenCalibration.read(path).shown(calibration.camera)
     path.write_text(text)
-    assert reference_from(path, calibration.camera).name == "wrong.sh"
-    with pytest.raises(InputError, match="--camera FILE"):
-        reference_from(path, None)
+    assert GivenCalibration.read(path).shown(calibration.camera).reference.name == "wrong.sh"
 
 
 def test_a_calibration_brings_its_camera_where_it_fits_the_frames(file, tmp_path):
     path = tmp_path / "c.json"
     path.write_text(write_calibration(file))
     camera = file.calibration.camera
-    assert camera_in(path, camera.width_px, camera.height_px) is not None
-    assert camera_in(path, camera.width_px + 1, camera.height_px) is None
+    given = GivenCalibration.read(path)
+    assert given.camera((camera.width_px, camera.height_px)) is not None
+    assert given.camera((camera.width_px + 1, camera.height_px)) is None

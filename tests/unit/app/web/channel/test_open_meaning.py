@@ -12,7 +12,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.recordings import Recording
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.opening.choice import MeaningPick
-from cocalib.opening.opened import about_calibration, meaning_of, reference_from
+from cocalib.opening.opened import GivenCalibration, about_calibration
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 
 POSE = RigidTransform(np.eye(3), [0.4, 0.1, -0.2])
@@ -32,9 +32,10 @@ def file(tmp_path: Path) -> Path:
 
 
 def _open_meaning(file: Path, recording: Recording) -> OpenMeaning:
-    meaning = reference_from(file, recording.camera(), MeaningPick())
-    assert isinstance(meaning, OpenMeaning)
-    return meaning
+    shown = GivenCalibration.read(file).shown(recording.camera(), MeaningPick())
+    assert shown.reference is None
+    assert shown.meaning is not None
+    return shown.meaning
 
 
 def test_the_rows_are_the_likely_meanings_with_their_place(file, sample):
@@ -68,7 +69,8 @@ def test_what_does_not_exist_is_refused(file, sample, query):
 
 
 def test_the_picked_meaning_is_the_calibration(file, sample):
-    shown = reference_from(file, sample.camera(), MeaningPick("radar_from_camera,body,m", "front.T"))
+    pick = MeaningPick("radar_from_camera,body,m", "front.T")
+    shown = GivenCalibration.read(file).shown(sample.camera(), pick).reference
     camera_radar_m = shown.calibration.camera_from_radar.inverse().translation_m
     assert np.abs(camera_radar_m - POSE.translation_m).max() < 1e-9
     assumed = [warning.facts["message"] for warning in shown.calibration.warnings if warning.code == "assumed"]
@@ -79,9 +81,9 @@ def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file, 
     camera = sample.camera()
     assert camera is not None
     pick = MeaningPick("radar_from_camera,body,rfu,m", "front.T")
-    meaning = meaning_of(file, camera, pick)
-    assert [row.meaning for row in meaning_rows(meaning).rows if row.is_shown] == [pick.meaning]
-    (warning,) = about_calibration(file, reference_from(file, camera, pick), meaning)
+    shown = GivenCalibration.read(file).shown(camera, pick)
+    assert [row.meaning for row in meaning_rows(shown.meaning).rows if row.is_shown] == [pick.meaning]
+    (warning,) = about_calibration(file.name, shown)
     assert warning.code == "calibration-picked"
     assert warning.facts["message"].startswith("extrinsic.json ")
 
@@ -91,7 +93,8 @@ def test_a_format_that_leaves_something_open_is_shown_with_what_was_assumed(tmp_
     assert camera is not None
     rows = " ".join(map(str, np.array([[0, -1, 0, 0], [0, 0, -1, 0.1], [1, 0, 0, 0]], float).ravel()))
     path.write_text("P2: 700 0 320 0 0 700 240 0 0 0 1 0\nR0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: " + rows + "\n")
-    assert meaning_of(path, camera) is None
-    (warning,) = about_calibration(path, reference_from(path, camera), None)
+    shown = GivenCalibration.read(path).shown(camera)
+    assert shown.meaning is None
+    (warning,) = about_calibration(path.name, shown)
     assert warning.code == "calibration-assumed"
     assert warning.facts["message"].startswith("calib.txt ")
