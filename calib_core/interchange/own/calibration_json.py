@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
@@ -131,6 +131,7 @@ def write_calibration(file: CalibrationFile) -> str:
     calibration = file.calibration
     sigma = np.sqrt(np.where(np.diag(calibration.covariance) >= 0, np.diag(calibration.covariance), np.nan)).tolist()
     check = file.check_point
+    corrected = bool(calibration.systematic_errors) or calibration.radar_errors != RadarErrors()
     document = documents.CalibrationDocument(
         schema=documents.CALIBRATION_SCHEMA,
         camera_from_radar=transform_document(calibration.camera_from_radar),
@@ -145,72 +146,29 @@ def write_calibration(file: CalibrationFile) -> str:
         check_point=documents.CheckPointDocument(nested(check.radar_m), nested(check.pixel_px)) if check else None,
         metrics=calibration.metrics,
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
-        radar_errors=calibration.radar_errors,
-        systematic_errors=list(calibration.systematic_errors),
+        radar_errors=calibration.radar_errors if corrected else UNSET,
+        systematic_errors=list(calibration.systematic_errors) if corrected else UNSET,
         radar_angle_map=angle_map_document(calibration.angle_map),
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
-        verdict=file.verdict,
-        evidence=file.evidence,
+        verdict=file.verdict or UNSET,
+        evidence=file.evidence or UNSET,
         warnings=[warning_text(warning) for warning in calibration.warnings],
         unpaired=[unpaired_text(click) for click in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
-        given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
+        given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else UNSET,
         vehicle=_stated_vehicle(file),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
-    content = builtins_of(document)
+    content = encodable(builtins_of(document))
     if not np.isfinite(calibration.metrics.picture_sigma_px):
         del content["metrics"]["picture_sigma_px"]
-    for pair in content["pairs"]:
-        if not pair["candidates"]:
-            for key in _SOLVED_FROM_KEYS:
-                del pair[key]
     unset = CalibrationOptions()
     for group in ("mounting", "refining"):
         if getattr(calibration.options, group) == getattr(unset, group):
             del content["options"][group]
-    absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
-    absent |= {"verdict"} if file.verdict is None else set()
-    absent |= {"evidence"} if file.evidence is None else set()
-    absent |= {"given_camera"} if calibration.given_camera is None else set()
-    absent |= {"vehicle"} if document.vehicle is None else set()
-    absent |= {"covariance_parts"} if document.covariance_parts is None else set()
-    if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
-        absent |= {"radar_errors", "systematic_errors"}
-    known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
-    return json_text(with_kept(known, file.kept))
-
-
-_KEY_ORDER = (
-    *(
-        "schema",
-        "equation",
-        "vehicle",
-        "frames",
-        "camera_from_radar",
-        "radar_from_camera",
-        "check_point",
-        "verdict",
-        "evidence",
-        "sigma",
-        "covariance",
-    ),
-    *("covariance_convention", "covariance_quantile", "covariance_parts", "metrics", "noise_scale", "radar_errors"),
-    *(
-        "systematic_errors",
-        "radar_angle_map",
-        "paper",
-        "warnings",
-        "unpaired",
-        "pairs",
-        "camera",
-        "given_camera",
-        "options",
-    ),
-    "provenance",
-)
+    return json_text(with_kept(content, file.kept))
 
 
 def read_calibration(content: str | bytes, source: str = "calibration") -> CalibrationFile:
@@ -305,8 +263,8 @@ def _file(
         iterative_px=nan_if_none(document.paper.iterative_px),
         sqpnp_px=nan_if_none(document.paper.sqpnp_px),
         angle_map=angle_map_of(document.radar_angle_map, source=source),
-        radar_errors=document.radar_errors,
-        systematic_errors=tuple(document.systematic_errors),
+        radar_errors=document.radar_errors or RadarErrors(),
+        systematic_errors=tuple(document.systematic_errors or ()),
         covariance_parts=covariance_parts_of(document.covariance_parts, source=source),
     )
     try:
@@ -318,8 +276,8 @@ def _file(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
-        verdict=document.verdict,
-        evidence=document.evidence,
+        verdict=document.verdict or None,
+        evidence=document.evidence or None,
         vehicle=document.vehicle or VehicleNote(),
     )
 
@@ -343,19 +301,19 @@ CALIBRATION_1 = Format(
 def _given_camera(document: documents.CalibrationDocument, *, source: str) -> Camera | None:
     """Return the intrinsics before they were refined, if they were."""
     given = document.given_camera
-    return None if given is None else camera_of(given, source=source, place="given_camera")
+    return camera_of(given, source=source, place="given_camera") if given else None
 
 
-def _stated_vehicle(file: CalibrationFile) -> VehicleNote | None:
-    """Return what is stated; None if nothing is, and no result goes back into it."""
+def _stated_vehicle(file: CalibrationFile) -> VehicleNote | UnsetType:
+    """Return what is stated; unset if nothing is, and no result goes back into it."""
     has_more = any(result.place[0] == "vehicle" for result in file.kept)
-    return file.vehicle if has_more or file.vehicle != VehicleNote() else None
+    return file.vehicle if has_more or file.vehicle != VehicleNote() else UNSET
 
 
-def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
+def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | UnsetType:
     """Return the document of an angle map."""
     if angle_map is None:
-        return None
+        return UNSET
     add, sigma = angle_map.correction_rad + 0.0, angle_map.sigma_rad
     return AngleMapDocument(
         azimuth_rad=angle_map.azimuth_rad.tolist(),
@@ -369,13 +327,13 @@ def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
     )
 
 
-def angle_map_of(document: AngleMapDocument | None, *, source: str) -> AngleMap | None:
+def angle_map_of(document: AngleMapDocument | UnsetType | None, *, source: str) -> AngleMap | None:
     """Return the angle map in a document.
 
     Raises:
         InputError: the tables do not fit the grid lines, or the grid lines do not ascend.
     """
-    if document is None:
+    if not document:
         return None
     try:
         return AngleMap(
@@ -390,23 +348,23 @@ def angle_map_of(document: AngleMapDocument | None, *, source: str) -> AngleMap 
         raise InputError(f"{source}: radar_angle_map: {error}; correct it or remove radar_angle_map") from None
 
 
-def covariance_parts_document(parts: CovarianceParts | None) -> CovariancePartsDocument | None:
+def covariance_parts_document(parts: CovarianceParts | None) -> CovariancePartsDocument | UnsetType:
     """Return the document of the parts; without a measured camera position that part is left out."""
     if parts is None or not np.isfinite(parts.systematic).all():
-        return None
+        return UNSET
     measured = nested(parts.camera_position + 0.0) if parts.camera_position.any() else None
     return CovariancePartsDocument(nested(parts.systematic + 0.0), measured)
 
 
 def covariance_parts_of(
-    document: CovariancePartsDocument | None, *, source: str, place: str = "covariance_parts"
+    document: CovariancePartsDocument | UnsetType | None, *, source: str, place: str = "covariance_parts"
 ) -> CovarianceParts | None:
     """Return the parts in a document.
 
     Raises:
         InputError: a part is no covariance.
     """
-    if document is None:
+    if not document:
         return None
     measured = document.camera_position
     return CovarianceParts(
@@ -545,9 +503,6 @@ def _inside(owner: Any, step: str | int) -> Any:
 
 _AGREEMENT_M = 1e-6
 
-_SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")
-"""The data a pair was solved from; omitted if unknown, as in files from other tools."""
-
 
 def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
     """Return the document of a solved pair."""
@@ -567,9 +522,9 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
         candidate=int(pair.candidate),
         rival=pair.rival if pair.rival >= 0 else UNSET,
         expected_covariance_px2=nested(pair.expected_covariance_px2),
-        sigma_px=measured.sigma_px if measured else None,
-        radar_time=measured.radar_time if measured else None,
-        candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else [],
+        sigma_px=measured.sigma_px if measured else UNSET,
+        radar_time=measured.radar_time if measured else UNSET,
+        candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else UNSET,
         mark=measured.mark if measured and measured.mark != "clicked" else UNSET,
         chosen=measured.chosen or UNSET if measured else UNSET,
     )
@@ -595,18 +550,18 @@ def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place
         rival=-1 if document.rival is UNSET else document.rival,
         expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
         image_time=document.image_time,
-        measured=_measured(document) if document.candidates else None,
+        measured=_measured(document, document.candidates) if document.candidates else None,
     )
 
 
-def _measured(document: documents.SolvedPairDocument) -> Pair:
+def _measured(document: documents.SolvedPairDocument, candidates: Sequence[documents.CandidateDocument]) -> Pair:
     return Pair(
         id=document.id,
         pixel_px=np.array(document.pixel_px),
-        candidates=tuple(_candidate(candidate) for candidate in document.candidates),
-        sigma_px=document.sigma_px,
+        candidates=tuple(_candidate(candidate) for candidate in candidates),
+        sigma_px=document.sigma_px or None,
         image_time=document.image_time,
-        radar_time=document.radar_time,
+        radar_time=None if document.radar_time is UNSET else document.radar_time,
         mark=document.mark or "clicked",
         chosen=document.chosen or None,
     )
@@ -639,16 +594,17 @@ def _candidate(document: documents.CandidateDocument) -> Candidate:
 
 
 def _check_candidates(document: documents.SolvedPairDocument, *, source: str, place: str) -> None:
-    for i, candidate in enumerate(document.candidates):
+    candidates = document.candidates or []
+    for i, candidate in enumerate(candidates):
         if not any(candidate.radar_m):
             raise InputError(
                 f"{source}: {place}.candidates[{i}].radar_m: is at the radar's origin; remove the candidate"
             )
-    if document.rival is not UNSET and document.rival >= len(document.candidates):
+    if document.rival is not UNSET and document.rival >= len(candidates):
         raise InputError(f"{source}: {place}.rival: there is no candidate {document.rival}; remove the rival")
-    if not document.candidates:
+    if not candidates:
         return
-    chosen = document.candidates[document.candidate] if document.candidate < len(document.candidates) else None
+    chosen = candidates[document.candidate] if document.candidate < len(candidates) else None
     if chosen is None or max(abs(a - b) for a, b in zip(chosen.radar_m, document.radar_m, strict=True)) > _AGREEMENT_M:
         raise InputError(
             f"{source}: {place}.radar_m: is not the position of candidate {document.candidate}; correct one of the two, "

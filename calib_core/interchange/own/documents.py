@@ -195,9 +195,9 @@ class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     candidate: Count = 0
     rival: Count | UnsetType = UNSET
     expected_covariance_px2: Matrix22 | None = None
-    sigma_px: Positive | None = None
-    radar_time: TimeNs | None = None
-    candidates: list[CandidateDocument] = []
+    sigma_px: Positive | UnsetType | None = None
+    radar_time: TimeNs | UnsetType | None = None
+    candidates: list[CandidateDocument] | UnsetType = []
     mark: Mark | UnsetType = UNSET
     chosen: ChosenReturn | UnsetType = UNSET
 
@@ -273,34 +273,34 @@ class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
     camera_position: Matrix66 | None = None
 
 
-class CalibrationDocument(Struct, frozen=True):
+class CalibrationDocument(Struct, frozen=True, kw_only=True):
     """A solved extrinsic calibration with its uncertainty."""
 
     schema: Literal["cocalib/calibration-1"]
-    camera_from_radar: TransformDocument
-    frames: FramesDocument
-    camera: CameraDocument
-    radar_from_camera: TransformDocument | None = None
     equation: str = ""
+    vehicle: VehicleNote | UnsetType | None = None
+    frames: FramesDocument
+    camera_from_radar: TransformDocument
+    radar_from_camera: TransformDocument | None = None
+    check_point: CheckPointDocument | None = None
+    verdict: StatedVerdict | UnsetType | None = None
+    evidence: Evidence | UnsetType | None = None
+    sigma: SigmaDocument = field(default_factory=SigmaDocument)
     covariance: Matrix66 | None = None
     covariance_convention: str = ""
     covariance_quantile: float | None = None
-    covariance_parts: CovariancePartsDocument | None = None
-    sigma: SigmaDocument = field(default_factory=SigmaDocument)
-    check_point: CheckPointDocument | None = None
+    covariance_parts: CovariancePartsDocument | UnsetType | None = None
     metrics: Metrics = field(default_factory=Metrics)
     noise_scale: NoiseScaleDocument = field(default_factory=NoiseScaleDocument)
-    radar_errors: RadarErrors = field(default_factory=RadarErrors)
-    systematic_errors: list[SystematicErrorResult] = []
-    radar_angle_map: AngleMapDocument | None = None
+    radar_errors: RadarErrors | UnsetType = field(default_factory=RadarErrors)
+    systematic_errors: list[SystematicErrorResult] | UnsetType = []
+    radar_angle_map: AngleMapDocument | UnsetType | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
-    verdict: StatedVerdict | None = None
-    evidence: Evidence | None = None
     warnings: list[WarningText] = []
     unpaired: list[UnpairedText] = []
     pairs: list[SolvedPairDocument] = []
-    given_camera: CameraDocument | None = None
-    vehicle: VehicleNote | None = None
+    camera: CameraDocument
+    given_camera: CameraDocument | UnsetType | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 

@@ -192,7 +192,7 @@ def _unknown_word(what: str, word: str, known: list[str], these: str) -> str:
 
 def _variants(annotation: Any) -> list[Any]:
     if get_origin(annotation) in (Union, types.UnionType):
-        return [form_of(part) for part in get_args(annotation) if part is not type(None)]
+        return [form_of(part) for part in get_args(annotation) if part not in (type(None), msgspec.UnsetType)]
     return [form_of(annotation)]
 
 
