@@ -31,8 +31,7 @@ _LEAST_PLACEMENTS = 3
 """What changed in a dwell shows against at least two others."""
 _SHORTEST_NS = 2 * NS_PER_S
 """A recording that is shorter is not searched: a few dense clouds in vain would take minutes."""
-_STOPPED = Unsolvable.reported("stopped", "the search for proposals was stopped", "start it again")
-_CLICK = "click the reflector on the page"
+_STOPPED = Unsolvable("stopped")
 
 
 class RecordedFrames(FrameSource, Protocol):
@@ -70,9 +69,9 @@ def find_proposals(
         CalibrationError: the recording cannot be read.
     """
     if camera is None:
-        return _no_camera()
+        return Unsolvable("no-camera")
     if not len(recording.image_times):
-        return Unsolvable.reported("no-frames", "the recording contains no camera frames", "add the camera's recording")
+        return Unsolvable("no-frames")
     if placements is None:
         if progress is not None:
             progress("searching the radar scans for placements")
@@ -191,33 +190,14 @@ def _placements(recording: RecordedFrames, gating: GatingOptions, stopped: Calla
 def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unsolvable | None:
     """Say why there can be no proposals; None if there can."""
     if len(placements) < _LEAST_PLACEMENTS:
-        found = {0: "no placement", 1: "one placement"}.get(len(placements), f"{len(placements)} placements")
-        return Unsolvable.reported(
-            "too-few-placements",
-            f"the radar shows {found}, and at least {_LEAST_PLACEMENTS} are needed: a placement is a strong return that appears, "
-            "stands still for two seconds or longer, and disappears",
-            "let the reflector stand still for some seconds at each of ten or more places, and check with cocalib info that "
-            f"the radar's topic and options are right; or {_CLICK}",
-        )
+        return Unsolvable("too-few-placements", {"placements": len(placements), "needed": _LEAST_PLACEMENTS})
     times = recording.image_times
     seen = [np.searchsorted(times, one.start) < np.searchsorted(times, one.end, side="right") for one in placements]
     if not any(seen):
         first_s, last_s = ((int(time) - int(placements[0].start)) / NS_PER_S for time in (times[0], times[-1]))
-        return Unsolvable.reported(
-            "no-frames-in-placements",
-            f"the camera recorded no frame during any of the {len(placements)} placements of the radar: its frames run from "
-            f"{first_s:+.1f} s to {last_s:+.1f} s of the first placement",
-            "check that both recordings are of the same time, and that their clocks agree",
-        )
+        span = {"first_s": first_s, "last_s": last_s}
+        return Unsolvable("no-frames-in-placements", {"placements": len(placements), **span})
     return None
-
-
-def _no_camera() -> Unsolvable:
-    return Unsolvable.reported(
-        "no-camera",
-        "the camera intrinsics are missing: the recording contains none that can be used",
-        "calibrate the lens from a board (cocalib intrinsics), or give them with --camera FILE",
-    )
 
 
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]

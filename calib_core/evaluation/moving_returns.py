@@ -167,28 +167,13 @@ def _usable(scans: RadarScans, options: TargetOptions) -> Flags:
 
 
 def _without_doppler(options: TargetOptions) -> tuple[DataWarning, ...]:
-    still = options.sensors == "still"
-    assumed = "" if still else "; this assumes that the sensors stood still, which nobody said"
-    return (
-        DataWarning.reported(
-            "no-doppler",
-            f"the radar reports no Doppler speeds, so targets count as moving by how far they travel{assumed}",
-            "if the sensors moved, Acc cannot be computed from this recording",
-        ),
-    )
+    return (DataWarning("no-doppler", {"assumed": options.sensors != "still"}),)
 
 
 def _unclear(unfitted: int, judged: int) -> tuple[DataWarning, ...]:
     if unfitted <= 0.5 * max(judged, 1):
         return ()
-    return (
-        DataWarning.reported(
-            "mostly-moving",
-            f"nearly all returns move in {unfitted} of {judged} scans, but not as they would if the sensors did: the radar's own "
-            "speed cannot be found, and the sensors are taken to stand still",
-            "right if the radar leaves out what stands still; if the sensors moved, Acc says nothing here",
-        ),
-    )
+    return (DataWarning("mostly-moving", {"unfitted": unfitted, "scans": judged}),)
 
 
 LEAST_RETURNS = 8

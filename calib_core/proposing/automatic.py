@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.measurements import Facts, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import candidate_rays
 from calib_core.proposing.dwell_views import DwellView
@@ -42,12 +42,13 @@ class AutomaticClicks:
     Attributes:
         clicks: one per placement that is certain enough, in order of time, with mark "snapped".
         confidence: probability that they are the reflector's, as a whole.
-        words: how this is known, as a sentence.
+        agreement: how this is known: `certain` of so many `placements` fit one mounting, with a `score` that chance reaches up to
+            `by_chance` and another mounting as `rival`.
     """
 
     clicks: tuple[ReflectorClick, ...]
     confidence: float
-    words: str
+    agreement: Facts
 
 
 def automatic_clicks(
@@ -62,45 +63,31 @@ def automatic_clicks(
         options: as the proposals were made with.
     """
     if len(views) < _LEAST_DWELLS:
-        return _refused(
-            f"the radar shows {_placements(len(views))}, and agreement by chance needs more to be ruled out"
-        )
+        return _refused("few-placements", placements=len(views))
     rays = candidate_rays(views, camera, options)
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     if agreement is None:
-        return _refused("picture and radar agree on no mounting; do both belong to the same recording?")
+        return _refused("no-mounting")
     if apex_log_odds(views, agreement) < 0.0:
-        return _refused("what stood still shows no reflector's apex in the pictures: it may be a person")
+        return _refused("no-apex")
     chance = max(chance_score(chance_scores(rays, prior)), LEAST_SCORE)
     rival = agreement.rival_score + _RIVAL_SHARE * agreement.score
     beyond = agreement.score - max(chance, rival)
     confidence = _MOST_CONFIDENCE / (1.0 + float(np.exp(-np.clip((beyond - _MARGIN) / _MARGIN_STEP, -50.0, 50.0))))
     certain = [one for one in proposals.ranked if one.confidence >= _LEAST_CLICK_CONFIDENCE]
-    figures = f"score {agreement.score:.0f}, by chance up to {chance:.0f}, another mounting {agreement.rival_score:.0f}"
+    scores = {"score": agreement.score, "by_chance": chance, "rival": agreement.rival_score}
     if confidence < LEAST_WHOLE_CONFIDENCE:
-        other = rival > chance
-        why = "another mounting fits nearly as well" if other else "chance would do nearly as well"
-        return _refused(
-            f"pictures and radar do not agree on one mounting clearly enough, {why} ({figures}; confidence {confidence:.2f})"
-        )
+        return _refused("rival" if rival > chance else "chance", confidence=confidence, **scores)
+    counts = {"certain": len(certain), "placements": len(views)}
     if len(certain) < _LEAST_CLICKS:
-        return _refused(
-            f"{len(certain)} of {_placements(len(views))} are certain enough, and {_LEAST_CLICKS} are needed"
-        )
+        return _refused("few-certain", needed=_LEAST_CLICKS, **counts)
     clicks = tuple(_click(one, number) for number, one in enumerate(sorted(certain, key=lambda one: one.image_time), 1))
-    words = f"{len(clicks)} of {_placements(len(views))} agree on one mounting ({figures})"
-    return AutomaticClicks(clicks, confidence, words)
+    return AutomaticClicks(clicks, confidence, {**counts, **scores})
 
 
-def _placements(count: int) -> str:
-    return f"{count} placement" + ("" if count == 1 else "s")
-
-
-def _refused(reason: str) -> Unsolvable:
-    return Unsolvable.reported(
-        "not-confident", reason, "confirm one or two proposals, or click the reflector in a few frames"
-    )
+def _refused(why: str, **facts: float) -> Unsolvable:
+    return Unsolvable("not-confident", {"why": why, **facts})
 
 
 def _click(proposal: Proposal, number: int) -> ReflectorClick:

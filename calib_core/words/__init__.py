@@ -12,11 +12,11 @@ from calib_core.words.outcomes import (
     outcome_told,
     said_of,
     unpaired_text,
-    unpaired_told,
     warning_text,
 )
 from calib_core.words.remark import Remark, remark
 from calib_core.words.text import OptionPart, PairPart, Words, join, listed, named, option, say, sentence, words
+from calib_core.words.unpaired import unpaired_told
 from calib_core.words.verdict import (
     StatedVerdict,
     action_of,

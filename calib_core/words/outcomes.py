@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.actions import CalibrateLens, SetOption
-from calib_core.words import intrinsics
-from calib_core.words.remark import Remark, Row, by_code, remark
+from calib_core.words import intrinsics, proposing
+from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.text import Words, join, option, say, sentence
+from calib_core.words.unpaired import unpaired_told
 from calib_core.words.warnings import told
 
 _INTRINSICS = (
@@ -110,65 +111,30 @@ def unreadable(*, why: str, pictures: int = 0) -> Remark:
     return remark(why, "the clicks are kept; fix the problem, then change any click to try again")
 
 
-def no_scan(*, gap_s: float | None = None, allowed_s: float = 0.0) -> Remark:
-    if gap_s is None:
-        return remark("the radar recording has no scan", "choose the radar topic that has returns")
+def internal_error(*, fault: str) -> Remark:
+    return remark(f"the solver failed: {fault}", "the clicks are kept; change any click to try again")
+
+
+def no_camera() -> Remark:
     return remark(
-        f"the nearest radar scan is {gap_s:.2f} s away; at most {allowed_s:g} s are allowed",
-        "click where both recordings overlap, or check that both clocks agree",
+        "the camera intrinsics are missing: the recording contains none that can be used",
+        "calibrate the lens from a board (Lens in the menu, cocalib intrinsics), drop a camera file on the page, or start again "
+        "with --camera FILE",
+        CalibrateLens(),
     )
 
 
-def no_static_return(
-    *,
-    scans: int = 0,
-    within_s: float = 0.0,
-    fastest_mps: float | None = None,
-    nearest_m: float = 0.0,
-    farthest_m: float = 0.0,
-    paper: bool = False,
-    gap_s: float | None = None,
-) -> Remark:
-    if paper:
-        return remark(
-            "no radar return passes the velocity and range filter"
-            if gap_s is None
-            else f"the nearest static radar return is {gap_s:.2f} s away",
-            f"Algorithm 1 keeps speeds up to {fastest_mps:g} m/s and ranges below {farthest_m:g} m: click where the reflector "
-            "stands still inside the radar recording, or raise these two options",
-            SetOption("paper.max_range_m"),
-        )
-    window = f"none of the {scans} scans within {within_s:g} s has a return"
-    if fastest_mps is None:
-        return remark(f"{window} with a position", "look at what the radar's driver writes: cocalib info RECORDING")
-    return remark(
-        f"{window} slower than {fastest_mps:g} m/s between {nearest_m:g} and {farthest_m:g} m",
-        "stand clear of the reflector and let it rest for three seconds, or widen the gates",
-        SetOption("gating.max_range_m"),
-    )
-
-
-def no_z_score_inlier(*, returns: int, z_score_threshold: float) -> Remark:
-    return remark(
-        f"none of the {returns} returns in the window is within {z_score_threshold:g} standard deviations on all three axes",
-        "raise the z-score threshold, or use the default method",
-        SetOption("paper.z_score_threshold"),
-    )
-
-
-def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
-    side = "left" if azimuth_deg > 0 else "right"
-    return remark(
-        f"the radar has no static return at the chosen position, {range_m:.1f} m away and {abs(azimuth_deg):.1f} deg to the "
-        f"{side}",
-        "choose another return for this click, or take the choice back",
-    )
+def no_clicks() -> Remark:
+    return remark("nothing was clicked", "click the recording on the page, or set auto = true")
 
 
 OUTCOMES: Mapping[str, Row] = {
     **by_code(
         degenerate_placements,
+        internal_error,
         mirrored_axes,
+        no_camera,
+        no_clicks,
         no_consensus,
         no_pose,
         points_in_one_line,
@@ -179,26 +145,15 @@ OUTCOMES: Mapping[str, Row] = {
         useless_lens_covariance,
     ),
     **intrinsics.OUTCOMES,
+    **proposing.OUTCOMES,
 }
-UNPAIRED = by_code(chosen_return_missing, no_scan, no_static_return, no_z_score_inlier)
 
 
 def outcome_told(outcome: Unsolvable) -> Remark:
     """Return why there is no calibration, and what to do: first about what looks wrong with the input."""
-    own = _told(outcome, OUTCOMES)
+    own = by_row(outcome, OUTCOMES)
     causes = [join((cause.message, cause.hint), "; ") for cause in map(told, outcome.suspected)]
     return Remark(own.message, join((*causes, own.hint), "; "), own.action)
-
-
-def unpaired_told(click: Unpaired) -> Remark:
-    """Return why a click has no radar position, and what to do."""
-    return _told(click, UNPAIRED)
-
-
-def _told(stated: Unsolvable | Unpaired, rows: Mapping[str, Row]) -> Remark:
-    if "message" in stated.facts:
-        return remark(stated.facts["message"], stated.facts["hint"])
-    return rows[stated.code](**stated.facts)
 
 
 def remark_on(stated: DataWarning | Unsolvable | Unpaired) -> Remark:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.actions import Action
 from calib_core.words.text import Words, words
 
@@ -34,3 +35,10 @@ def remark(message: Words | str, hint: Words | str, action: Action | None = None
 def by_code(*rows: Row) -> Mapping[str, Row]:
     """Return rows by their codes, which are their names with hyphens."""
     return {row.__name__.replace("_", "-"): row for row in rows}
+
+
+def by_row(stated: DataWarning | Unpaired | Unsolvable, rows: Mapping[str, Row]) -> Remark:
+    """Return what the row of its code says, or what was reported with it."""
+    if "message" in stated.facts:
+        return remark(stated.facts["message"], stated.facts["hint"])
+    return rows[stated.code](**stated.facts)

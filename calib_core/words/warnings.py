@@ -18,8 +18,8 @@ from calib_core.results.actions import (
     SpreadPlacements,
 )
 from calib_core.results.systematic_errors import SystematicErrorResult, family_of
-from calib_core.words import intrinsics
-from calib_core.words.remark import Remark, Row, by_code, remark
+from calib_core.words import evaluation, intrinsics
+from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.systematic_errors import FAMILIES, error_words, knowledge, percent, prior_text, value_text
 from calib_core.words.text import Words, count, join, listed, named, option, say
 
@@ -750,6 +750,13 @@ def behind_camera(*, ids: Sequence[str], pairs: int) -> Remark:
     )
 
 
+def no_camera() -> Remark:
+    return remark(
+        "No camera in this recording: nothing can be clicked",
+        "add the camera's file to calibrate: cocalib open RADAR CAMERA",
+    )
+
+
 SOLVER = by_code(
     agreeing_outliers,
     angle_scale,
@@ -784,11 +791,9 @@ SOLVER = by_code(
     units_suspected,
     weak_geometry,
 )
-ROWS: Mapping[str, Row] = {**SOLVER, **intrinsics.WARNINGS}
+ROWS: Mapping[str, Row] = {**SOLVER, **intrinsics.WARNINGS, **evaluation.WARNINGS, **by_code(no_camera)}
 
 
 def told(warning: DataWarning) -> Remark:
     """Return what a warning says: by its row, or as it was reported with it."""
-    if "message" in warning.facts:
-        return remark(warning.facts["message"], warning.facts["hint"])
-    return ROWS[warning.code](**warning.facts)
+    return by_row(warning, ROWS)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from calib_core.words import intrinsics
-from calib_core.words.outcomes import OUTCOMES, UNPAIRED
+from calib_core.words import evaluation, intrinsics
+from calib_core.words.outcomes import OUTCOMES
 from calib_core.words.remark import Row
+from calib_core.words.unpaired import UNPAIRED
 from calib_core.words.warnings import ROWS, SOLVER
 from docs.make_warnings_table import PAGE, with_tables
 
@@ -54,12 +55,33 @@ def test_every_code_has_a_row_whose_parameters_are_its_facts(project_root: Path,
         assert not whole or needed <= _facts(call), code
 
 
-def test_the_page_of_the_lens_explains_every_code_and_no_other(project_root: Path):
-    text = (project_root / "docs" / "intrinsics.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^\| `([a-z]+-[a-z-]+)` \|", text, re.MULTILINE)) == set(intrinsics.WARNINGS)
-
-
 def test_the_page_has_the_rows_and_consequences_of_the_program():
     page = PAGE.read_text(encoding="utf-8")
     assert with_tables(page) == page, "run: python docs/make_warnings_table.py"
     assert all(row.__doc__ for row in SOLVER.values())
+
+
+@pytest.mark.parametrize(
+    ("page", "codes"),
+    [
+        ("intrinsics", {*intrinsics.WARNINGS}),
+        ("evaluation", {*evaluation.WARNINGS, "other-lens"}),
+    ],
+)
+def test_a_page_explains_every_code_of_its_subject_and_no_other(project_root: Path, page: str, codes: set[str]):
+    text = (project_root / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `([a-z]+-[a-z-]+)` \|", text, re.MULTILINE)) == codes
+
+
+_MAY_REPORT = (
+    *("calib_core/recordings/", "calib_core/interchange/importing.py", "calib_core/words/outcomes.py"),
+    *("app/cocalib/session/file/", "app/cocalib/opening/opened.py", "app/cocalib/report/"),
+    "app/cocalib/evaluation/recording_check.py",
+)
+"""What reads recordings and files, and repeats what those say."""
+
+
+def test_only_what_reads_recordings_and_files_repeats_the_words_of_others(project_root: Path):
+    for path in (*(project_root / "calib_core").rglob("*.py"), *(project_root / "app").rglob("*.py")):
+        name = path.relative_to(project_root).as_posix()
+        assert name.startswith(_MAY_REPORT) or ".reported(" not in path.read_text(encoding="utf-8"), name

@@ -10,6 +10,7 @@ from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file,
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
+from calib_core.words.proposing import agreement_text
 from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
@@ -80,9 +81,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     """
     require_confirmed(recording)
     if given.clicks is None and not row.auto:
-        return Unsolvable.reported(
-            "no-clicks", "nothing was clicked", "click the recording on the page, or set auto = true"
-        )
+        return Unsolvable("no-clicks")
     camera = required_camera(recording, given.camera)
     notes = [f"radar: {recording.radar_choice}"] if recording.radar_choice else []
     placed = _placed(row, given.clicks, recording, camera, notes)
@@ -116,7 +115,7 @@ def _placed(
         return PlacedClicks(clicks, file.unconfirmed if file is not None else None)
     placed = place_clicks(recording, camera, row.options, confirmed=clicks, reflector_m=row.reflector_m)
     if not isinstance(placed, Unsolvable):
-        notes.append(f"automatic: {placed.words}")
+        notes.append(f"automatic: {agreement_text(placed.agreement)}")
     return placed
 
 

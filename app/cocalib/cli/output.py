@@ -39,7 +39,12 @@ def on_terminal(said: "Words") -> str:
     return said.text(option=_flag)
 
 
-_FLAGS = {"method": "--method", "radar_axes": "--radar-axes", "clock": "--clock"}
+_FLAGS = {
+    "method": "--method",
+    "radar_axes": "--radar-axes",
+    "clock": "--clock",
+    "solving.camera_position": "--camera-position-m",
+}
 
 
 def _flag(part: "OptionPart") -> str:

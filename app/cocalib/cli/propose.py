@@ -92,12 +92,7 @@ def _explain_nothing(proposals: "Proposals", recording: "Recording") -> int:
     from cocalib.cli.proposal_table import unproposed_lines
 
     print("\n".join(unproposed_lines(proposals, TimeNs(int(recording.image_times[0])))), file=sys.stderr)
-    nothing = Unsolvable.reported(
-        "nothing-proposed",
-        f"none of the {len(proposals.unproposed)} placements shows where in the picture the reflector stood",
-        "click the first two places yourself, on the page or with --clicks: they show how large the reflector is, what it "
-        "looks like and where the camera points; check the intrinsics, --radar-axes and that both recordings are of one time",
-    )
+    nothing = Unsolvable("nothing-proposed", {"placements": len(proposals.unproposed)})
     return explain_unsolvable(nothing, what="no proposals")
 
 

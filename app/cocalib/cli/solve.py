@@ -256,12 +256,13 @@ class Solve:
 
 def _placed_words(placed: "PlacedClicks") -> str:
     """Say how many clicks were placed, and how sure they are."""
-    if placed.unconfirmed is None:
-        return placed.words
     from calib_core.words import probability_text
+    from calib_core.words.proposing import agreement_text
 
+    if placed.unconfirmed is None:
+        return agreement_text(placed.agreement)
     count = len(placed.unconfirmed.ids)
     return (
         f"{count} {'click' if count == 1 else 'clicks'} placed that nobody confirmed (confidence "
-        f"{probability_text(placed.unconfirmed.confidence)}): {placed.words}"
+        f"{probability_text(placed.unconfirmed.confidence)}): {agreement_text(placed.agreement)}"
     )

@@ -26,7 +26,6 @@ from calib_core.evaluation.target_tracking import LONGEST_STEP_S
 from calib_core.measurements import NS_PER_S, Boxes, Pair, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, PairResult
-from calib_core.words import unpaired_told
 
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
@@ -264,23 +263,15 @@ def _have_cuboids(boxes: Boxes) -> bool:
 
 def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     """Warn that clicks gave no residual."""
-    if not unpaired:
-        return (
-            DataWarning.reported(
-                "no-paired-clicks", "all clicks are excluded or untouched, so there are no residuals", "include clicks"
-            ),
-        )
-    first = unpaired_told(unpaired[0])
-    message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.message}"
-    return (DataWarning.reported("no-paired-clicks", message, str(first.hint)),)
+    facts = {"clicks": len(unpaired), "first": unpaired[0]} if unpaired else {}
+    return (DataWarning("no-paired-clicks", facts),)
 
 
 def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
     """Pass on what reading the boxes took for granted or left out, and name the classes that no box has."""
     absent = (f"no box is of the class '{name}'" for name in classes if name not in boxes.labels)
     notes = (*boxes.notes, *absent)
-    hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
-    return tuple(DataWarning.reported("boxes-note", f"{boxes.source}: {note}", hint) for note in notes)
+    return tuple(DataWarning("boxes-note", {"source": boxes.source, "note": note}) for note in notes)
 
 
 def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
@@ -288,47 +279,17 @@ def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
     named = all(box.track for frame in boxes for box in frame.boxes)
     for what, times in (("scans", radar_times), ("annotated frames", boxes.times_ns[:0] if named else boxes.times_ns)):
         apart_s = float(np.median(np.diff(times))) / NS_PER_S if len(times) > 1 else 0.0
-        times_farther = apart_s / LONGEST_STEP_S
-        if times_farther > 1.0:
-            return (
-                DataWarning.reported(
-                    "sparse-frames",
-                    f"{what} are {times_farther:.3g} times farther apart ({apart_s:.3g} s) than targets can be followed, "
-                    "so there is no Acc",
-                    "give boxes with cuboids, for which no target is followed, or --labels; or the whole recording in place of "
-                    "its keyframes, and boxes with a track for each object",
-                ),
-            )
+        if apart_s > LONGEST_STEP_S:
+            return (DataWarning("sparse-frames", {"frames": what, "apart_s": apart_s, "longest_s": LONGEST_STEP_S}),)
     return ()
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
-    if not len(returns.frames) and returns.by_cuboid:
-        return (
-            DataWarning.reported(
-                "no-target-in-a-box",
-                "no direction of the camera puts clearly more returns into the cuboids than others do, so there is no Acc",
-                "are the cuboids of this recording, in the axes of its camera, and on one clock with the radar?",
-            ),
-        )
     if not len(returns.frames):
-        return (
-            DataWarning.reported(
-                "no-targets",
-                "no moving target was found in the scans of the annotated frames, so there is no Acc",
-                f"record people, cars or robots that move within {TargetOptions().max_range_m:g} m of the radar, or lower "
-                "--min-speed-mps; what stands still has no Doppler speed",
-            ),
-        )
+        far = {"max_range_m": TargetOptions().max_range_m}
+        return (DataWarning("no-target-in-a-box") if returns.by_cuboid else DataWarning("no-targets", far),)
     if not returns.matched_targets:
-        return (
-            DataWarning.reported(
-                "no-target-in-a-box",
-                f"none of {returns.found_targets} moving targets could be matched to a box by bearing and time, so every "
-                "return counts as outside",
-                "are the boxes of this recording, around what moves, and on one clock with the radar?",
-            ),
-        )
+        return (DataWarning("no-target-in-a-box", {"targets": returns.found_targets}),)
     return ()
 
 
@@ -341,11 +302,4 @@ def _turned(calibration: Calibration, returns: CountedReturns) -> list[DataWarni
     off = (returns.bearings.turn_rad - expected + np.pi) % (2.0 * np.pi) - np.pi
     if abs(off) < _TURNED_RAD:
         return []
-    return [
-        DataWarning.reported(
-            "turned-from-boxes",
-            f"targets and boxes agree best with a camera turned by {np.rad2deg(off):+.0f} deg from the calibration about the "
-            "vertical (positive to the left)",
-            "the calibration, or the match of targets and boxes, is wrong; look at the overlay",
-        )
-    ]
+    return [DataWarning("turned-from-boxes", {"turned_deg": float(np.rad2deg(off))})]

@@ -2,29 +2,26 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
 from calib_core.geometry import camera_position_jacobian
-from calib_core.measurements import ReflectorClick, Unpaired, Unsolvable
+from calib_core.measurements import Facts, ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import ViewProgress
 from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.results.confirmation import nobody_confirmed
 from calib_core.results.verdict import verdict_on
-from calib_core.words.verdict import reason
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving.solving import solve_clicks
 
 _FARTHEST_M = 0.3
 """Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried
 from place to place beside the reflector looks like a camera so far away."""
-_BY_PERSON = "open the recording on the page and confirm what it proposes, from one click on"
-_BY_TAPE = "if it is, measure its position with a tape (--camera-position-m X Y Z); else look at the clicks on the page"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +31,12 @@ class PlacedClicks:
     Attributes:
         clicks: those that a person confirmed, and those that were placed automatically.
         unconfirmed: the latter.
-        words: what their confidence rests on, as a clause.
+        agreement: what their confidence rests on, as in `AutomaticClicks`; empty if none was placed.
     """
 
     clicks: tuple[ReflectorClick, ...]
     unconfirmed: UnconfirmedClicks | None
-    words: str = ""
+    agreement: Facts = field(default_factory=dict)
 
 
 def place_clicks(
@@ -80,13 +77,13 @@ def place_clicks(
     assert camera is not None, "without a camera there are no proposals"
     views, proposals = found
     if not proposals.ranked and any(click.counts for click in confirmed):
-        return PlacedClicks(tuple(confirmed), None, "no placement is left to propose")
+        return PlacedClicks(tuple(confirmed), None)
     placed = automatic_clicks(proposals, views, camera, options)
     if isinstance(placed, Unsolvable):
         return placed
     clicks = _with_own_ids(placed.clicks, confirmed)
     unconfirmed = UnconfirmedClicks(tuple(click.id for click in clicks), placed.confidence)
-    return PlacedClicks((*confirmed, *clicks), unconfirmed, placed.words)
+    return PlacedClicks((*confirmed, *clicks), unconfirmed, placed.agreement)
 
 
 def solve_placed_clicks(
@@ -125,15 +122,10 @@ def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) ->
     """
     verdict = verdict_on(calibration)
     if verdict.level == "contradictory":
-        why = f"nobody confirmed the clicks, and the pose from them is contradictory: {reason(verdict)}"
-        return Unsolvable.reported("not-confident", why, _BY_PERSON, unpaired)
+        return Unsolvable("not-confident", {"contradiction": verdict.cause}, unpaired)
     away_m = _least_distance_m(calibration)
     if calibration.options.solving.camera_position is None and away_m > _FARTHEST_M:
-        why = (
-            f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
-            "carried along with the reflector would look the same"
-        )
-        return Unsolvable.reported("not-confident", why, _BY_TAPE, unpaired)
+        return Unsolvable("not-confident", {"camera_away_m": away_m}, unpaired)
     return None
 
 

@@ -95,12 +95,7 @@ def solve_in_steps(
     """
     checked_options(options)
     if camera is None:
-        yield Unsolvable.reported(
-            "no-camera",
-            "the camera intrinsics are missing: the recording contains none that can be used",
-            "calibrate the lens from a board in a recording (Lens in the menu, cocalib intrinsics), or drop a camera file on the "
-            "page, or start again with --camera FILE",
-        )
+        yield Unsolvable("no-camera")
         return
     scans = scans_around(recording, clicks, options)
     about_lost = _about_lost(recording, clicks, options)

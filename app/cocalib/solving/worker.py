@@ -114,11 +114,7 @@ def _deliver(request: _Request, future: "Future[Solved | None]") -> None:
 
 def _failure(error: BaseException) -> Unsolvable:
     if isinstance(error, CalibrationError):
-        return Unsolvable.reported(
-            "unreadable", str(error), "the clicks are kept; fix the problem, then change any click to try again"
-        )
+        return Unsolvable("unreadable", {"why": str(error)})
     line = report_of(error, "solving")
     _log.error("%s", line)
-    return Unsolvable.reported(
-        "internal-error", f"the solver failed: {line}", "the clicks are kept; change any click to try again"
-    )
+    return Unsolvable("internal-error", {"fault": line})

@@ -62,12 +62,6 @@ from cocalib.view.model import (
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.wording import plain
 
-_WITHOUT_PICTURES = DataWarning.reported(
-    "no-camera",
-    "No camera in this recording: nothing can be clicked.",
-    "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
-)
-
 
 def view(
     history: History,
@@ -105,7 +99,7 @@ def view(
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
-        warnings=_warnings(calibration, verdict) if facts.has_pictures else (warning_row(_WITHOUT_PICTURES),),
+        warnings=_warnings(calibration, verdict) if facts.has_pictures else (warning_row(DataWarning("no-camera")),),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
         advice=advice_for(calibration, verdict) if calibration else None,

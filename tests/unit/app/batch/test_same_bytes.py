@@ -18,6 +18,7 @@ from cocalib.cli import run
 from cocalib.solving import automatic as automatic_solving
 from cocalib.solving.automatic import PlacedClicks
 
+AGREEMENT = {"certain": 9, "placements": 9, "score": 40.0, "by_chance": 25.0, "rival": 10.0}
 SAMPLE = Path(__file__).resolve().parents[4] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")
 CLICKS = SAMPLE / "clicks.json"
@@ -126,7 +127,7 @@ def test_clicks_of_a_person_and_of_nobody(commands, tmp_path, monkeypatch):
         assert len(confirmed) == 4
         known = {click.id for click in confirmed}
         rest = tuple(click for click in reversed(sample) if click.id not in known)
-        return PlacedClicks((*confirmed, *rest), UnconfirmedClicks(tuple(one.id for one in rest), 0.99), "they agree")
+        return PlacedClicks((*confirmed, *rest), UnconfirmedClicks(tuple(one.id for one in rest), 0.99), AGREEMENT)
 
     monkeypatch.setattr(solving, "place_clicks", place)
     monkeypatch.setattr(automatic_solving, "place_clicks", place)
@@ -141,4 +142,4 @@ def test_clicks_of_a_person_and_of_nobody(commands, tmp_path, monkeypatch):
     assert files["evaluation.json"] == commands.evaluate("--clicks", placed)
     assert files["report.html"] == commands.report("--clicks", placed)
     assert "nobody-confirmed" in outcome.warnings
-    assert any("they agree" in note for note in outcome.notes)
+    assert any("score 40" in note for note in outcome.notes)

@@ -16,7 +16,9 @@ from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingO
 from calib_core.proposing import PictureCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import UnconfirmedClicks
+from calib_core.results.actions import MeasureCameraPosition
 from calib_core.synthetic import simulate_pairs
+from calib_core.words import outcome_told
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))
@@ -40,7 +42,7 @@ def one_proposal() -> Proposals:
 
 
 def test_a_persons_click_stays_and_an_automatic_one_of_the_same_id_is_renamed(monkeypatch):
-    found(monkeypatch, ((), one_proposal()), AutomaticClicks((PLACED,), 0.97, "it fits"))
+    found(monkeypatch, ((), one_proposal()), AutomaticClicks((PLACED,), 0.97, {}))
     placed = place_clicks(RECORDING, CAMERA, OPTIONS, confirmed=[PERSON])
     assert placed.clicks == (PERSON, replace(PLACED, id="automatic-01-auto"))
     assert (placed.unconfirmed.ids, placed.unconfirmed.confidence) == (("automatic-01-auto",), 0.97)
@@ -76,4 +78,4 @@ def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(away_m, measur
     assert isinstance(outcome, Unsolvable) is is_refused
     if isinstance(outcome, Unsolvable):
         assert outcome.code == "not-confident"
-        assert "--camera-position-m" in outcome.facts["hint"]
+        assert outcome_told(outcome).action == MeasureCameraPosition()

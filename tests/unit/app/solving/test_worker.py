@@ -76,7 +76,7 @@ def test_a_recording_that_cannot_be_read_is_reported_as_the_answer():
     outcome = answers.wait().outcome
     worker.close()
     assert outcome.code == "unreadable"
-    assert outcome.facts["message"].startswith("radar.bag: chunk 7 ")
+    assert outcome.facts["why"].startswith("radar.bag: chunk 7 ")
 
 
 def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog, tmp_path):
@@ -93,8 +93,8 @@ def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(ca
         worker.request(1, [CLICK], CalibrationOptions(), answers)
         outcome = answers.wait().outcome
     assert outcome.code == "internal-error"
-    assert "(ZeroDivisionError: by zero)" in outcome.facts["message"]
-    assert str(tmp_path) in outcome.facts["message"], "the report's place is told"
+    assert "(ZeroDivisionError: by zero)" in outcome.facts["fault"]
+    assert str(tmp_path) in outcome.facts["fault"], "the report's place is told"
     assert "ZeroDivisionError" in caplog.text
     worker.request(2, [CLICK], CalibrationOptions(), answers)
     assert answers.wait().revision == 2

@@ -30,8 +30,9 @@ from calib_core.results.actions import (
 )
 from calib_core.results.systematic_errors import SystematicErrorResult
 from calib_core.words import in_sentences
-from calib_core.words.outcomes import OUTCOMES, UNPAIRED
+from calib_core.words.outcomes import OUTCOMES
 from calib_core.words.systematic_errors import ERRORS
+from calib_core.words.unpaired import UNPAIRED
 from calib_core.words.verdict import words_of
 from calib_core.words.warnings import ROWS
 from cocalib.session import ClickExcluded, History
@@ -54,7 +55,7 @@ def _views() -> Iterator[tuple[str, View]]:
         "no pose",
         shown(5, Unsolvable.reported("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements")),
     )
-    yield "no intrinsics", shown(1, Unsolvable.reported("no-camera", "the intrinsics are missing", "give --camera"))
+    yield "no intrinsics", shown(1, Unsolvable("no-camera"))
     yield "clicks that the radar did not see", shown(5, UNSEEN)
     yield "a click in every state", shown(5, EVERY_STATE, ClickExcluded("c3", True))
     yield "a click that two returns fit", shown(5, calibration(*FIVE[:4], ASKING))
@@ -96,6 +97,7 @@ def _lines(name: str, seen: View) -> Iterator[str]:
 _DAMAGE = DataWarning.reported("damaged-file", "radar.bag: chunk 7 is damaged", "copy it again")
 _SCALE = SystematicErrorResult("azimuth_scale", 0.012, 0.009, 0.02, True, 0.51, 0.05)
 _AWAY = {"away_deg": 12.0, "away_cm": 84.0}
+_SCORES = {"score": 31.0, "by_chance": 25.0, "rival": 29.0}
 _BOARD = Board("checkerboard", 9, 6, 0.025)
 _IMAGE = {"clicks": 9, "width_px": 640, "height_px": 480}
 _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
@@ -176,6 +178,18 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("unequal-focal-lengths", {"fx_px": 700.0, "fy_px": 735.0}),
     DataWarning("unequal-squares", {"stretch": 0.02, "sigma": 0.001, "modelled": False}),
     DataWarning("weak-focal-length", {"sigma": 0.03}),
+    DataWarning("no-camera"),
+    DataWarning("boxes-note", {"source": "boxes.json", "note": "boxes are scaled by 0.5"}),
+    DataWarning("mostly-moving", {"unfitted": 30, "scans": 40}),
+    DataWarning("no-doppler", {"assumed": False}),
+    DataWarning("no-doppler", {"assumed": True}),
+    DataWarning("no-paired-clicks"),
+    DataWarning("no-paired-clicks", {"clicks": 3, "first": Unpaired("no-scan", id="c1")}),
+    DataWarning("no-target-in-a-box"),
+    DataWarning("no-target-in-a-box", {"targets": 7}),
+    DataWarning("no-targets", {"max_range_m": 200.0}),
+    DataWarning("sparse-frames", {"frames": "scans", "apart_s": 0.75, "longest_s": 0.5}),
+    DataWarning("turned-from-boxes", {"turned_deg": -7.0}),
     Unsolvable("degenerate-placements", {"placements": 5}),
     Unsolvable("degenerate-placements", {"placements": 3, "clicks": 9, "needed": 4}),
     Unsolvable("mirrored-axes", {"agreeing": 3, "pairs": 9}),
@@ -191,6 +205,21 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("unreadable", {"why": "left01.png: the file is cut off", "pictures": 20}),
     Unsolvable("useless-lens-covariance"),
     Unsolvable("useless-lens-covariance", {"parameter": "fx_px", "value_px": 700.0, "sigma_px": 400.0}),
+    Unsolvable("internal-error", {"fault": "ZeroDivisionError: by zero"}),
+    Unsolvable("no-camera"),
+    Unsolvable("no-clicks"),
+    Unsolvable("no-frames"),
+    Unsolvable("no-frames-in-placements", {"placements": 9, "first_s": -90.0, "last_s": -12.0}),
+    *(
+        Unsolvable("not-confident", {"why": why, "placements": 4})
+        for why in ("few-placements", "no-mounting", "no-apex")
+    ),
+    *(Unsolvable("not-confident", {"why": why, **_SCORES, "confidence": 0.41}) for why in ("chance", "rival")),
+    Unsolvable("not-confident", {"why": "few-certain", "certain": 4, "placements": 9, "needed": 6}),
+    Unsolvable("not-confident", {"contradiction": DataWarning("handedness-open")}),
+    Unsolvable("not-confident", {"camera_away_m": 1.2}),
+    Unsolvable("nothing-proposed", {"placements": 9}),
+    Unsolvable("too-few-placements", {"placements": 1, "needed": 3}),
     Unsolvable("few-views", {"views": 2, "needed": 3, "left_out": [LeftOutPicture(7, "image 7", "blurred")]}),
     Unsolvable("few-views", {"views": 7, "needed": 8, "halves": True}),
     Unsolvable("mixed-sizes", {"counts": [((640, 480), 9), ((320, 240), 8)]}),
