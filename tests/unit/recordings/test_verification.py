@@ -80,7 +80,7 @@ def test_rows_that_are_absent_are_told(tmp_path):
     path.write_bytes(file.data)
     found = verified(altered(path, "DELETE FROM messages WHERE id BETWEEN 11 AND 13"))
     assert not found.sound
-    assert any("(11 to 13)" in warning.facts["message"] for warning in found.warnings)
+    assert any("(11 to 13)" in warning.message for warning in found.warnings)
 
 
 def pictures(ros, jpeg, others):
