@@ -130,7 +130,7 @@ export function rawBox(changed) {
   box.addEventListener("change", changed);
   const label = make("label", "", [box, "For radar data as reported: my software does not correct them"]);
   label.dataset.hint = "Solved once more without taking out what the radar gets wrong (--for raw).";
-  return { box, row: make("div", "rectified", [label]) };
+  return { box, row: make("div", "rectified raw", [label]) };
 }
 
 const WIDTH = 280;

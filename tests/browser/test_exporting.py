@@ -18,7 +18,7 @@ from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
-RECTIFIED = f"{DIALOG} .rectified input"
+RECTIFIED = f"{DIALOG} .rectified:not(.raw) input"
 
 
 @pytest.fixture(scope="module")
