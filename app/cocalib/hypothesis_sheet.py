@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.arrays import Points3
 from calib_core.errors import InputError
+from calib_core.file_tag import tagged_png
 from calib_core.measurements import TimeNs
 
 if TYPE_CHECKING:
@@ -152,10 +153,10 @@ def _caption(frame: FrameWithReturns, number: int, one: "Hypothesis") -> np.ndar
 
 
 def png(picture: np.ndarray) -> bytes:
-    """Return a picture as a PNG file."""
+    """Return a picture as a PNG file of ours."""
     import cv2
 
-    return bytes(cv2.imencode(".png", picture)[1])
+    return tagged_png(bytes(cv2.imencode(".png", picture)[1]))
 
 
 def jpeg(picture: np.ndarray) -> bytes:

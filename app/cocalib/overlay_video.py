@@ -13,6 +13,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2
 from calib_core.errors import InputError, MessageError, RecordingError
+from calib_core.file_tag import TAG
 from calib_core.measurements import NS_PER_S, Box, RadarScans, TimeNs
 from calib_core.recordings import SkippedFrames, WrittenVideo, video_format
 from calib_core.results import Calibration, PairResult
@@ -99,11 +100,8 @@ def write_overlay(
         RecordingError: no frame can be read.
     """
     video_format(path)
-    try:
-        with whole_path(path) as part:
-            return _write(view, part, options, progress)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with whole_path(path) as part:
+        return _write(view, part, options, progress)
 
 
 class Panels:
@@ -499,6 +497,7 @@ def encoding(path: Path, size_px: tuple[int, int], frames_per_s: float) -> Itera
         )
     label, options = _CODECS[name]
     with av.open(str(path), "w", format=form) as container:
+        container.metadata["comment"] = TAG
         stream: Any = container.add_stream(name, rate=max(1, round(frames_per_s)), options=options)
         stream.width, stream.height = size_px
         stream.pix_fmt = "yuvj420p" if name == "mjpeg" else "yuv420p"

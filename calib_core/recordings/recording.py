@@ -32,7 +32,7 @@ from calib_core.recordings.radar.column_plan import ColumnReading, column_readin
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.scan_stream import Losses
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
-from calib_core.recordings.recording_file import RecordingFile, with_recording_file
+from calib_core.recordings.recording_file import RecordingFile, recording_file_of, with_recording_file
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Usage, select_image, usage_of
 from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
@@ -119,6 +119,19 @@ class Recording:
     def name(self) -> str:
         """The name of the recording for messages."""
         return " + ".join(name_text(path.name) for path in self.paths)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What it is read from: the file of each source, or its folder and the files in it, and a recording.toml."""
+        inner = (
+            file
+            for source in self.sources
+            if isinstance(source, PlainSource) and source.path.is_dir()
+            for file in files_behind(source.path)
+            if file.stem in source.names
+        )
+        beside = () if self._file is None else map(recording_file_of, self.paths)
+        return (*(source.path for source in self.sources), *inner, *beside)
 
     @property
     def recording_file(self) -> str:

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from calib_core.errors import InputError, RecordingError
+from calib_core.file_tag import TAG
 from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.recording import Recording
@@ -85,23 +86,11 @@ def write_video(
         progress: called with the frames done and the total frames.
 
     Raises:
-        InputError: PyAV is missing, the suffix is not supported, or the file cannot be written.
+        InputError: PyAV is missing, or the suffix is not supported.
         RecordingError: no frame can be read.
+        OSError: the file cannot be written; a part of it may be there.
     """
     form = video_format(path)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        written = _write(recording, part, form, progress)
-        part.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        if part.parent.is_dir():
-            part.unlink(missing_ok=True)
-    return written
-
-
-def _write(recording: Recording, path: Path, form: str, progress: Callable[[int, int], None] | None) -> WrittenVideo:
     import av
 
     skipped = SkippedFrames()
@@ -115,6 +104,7 @@ def _write(recording: Recording, path: Path, form: str, progress: Callable[[int,
     options = {} if form == "matroska" else {"video_track_timescale": str(10**9 // _TICK_NS)}
     count, ticks = 0, -1
     with av.open(str(path), "w", format=form, options=options) as container:
+        container.metadata["comment"] = TAG
         stream = container.add_stream("mjpeg")
         stream.width, stream.height, stream.pix_fmt = picture.width_px, picture.height_px, "yuvj420p"
         stream.time_base = Fraction(_TICK_NS, 10**9)

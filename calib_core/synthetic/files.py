@@ -89,6 +89,13 @@ def write_recording(
     return tuple(written)
 
 
+def pictures_size_bytes(recording: SimulatedRecording) -> int:
+    """Return about how large the pictures of one container will be on disk, by the first one."""
+    first = next(recording.frames(1)).jpeg(recording.options.jpeg_quality)
+    cameras = 1 if recording.other_camera is None else 2
+    return len(first) * cameras * len(recording.stage.frame_times.header_ns)
+
+
 def _write_truth(recording: SimulatedRecording, folder: Path, suffix: str = "") -> None:
     (folder / f"truth{suffix}.json").write_text(truth_text(recording), encoding="utf-8")
     (folder / f"clicks{suffix}.json").write_text(clicks_text(recording), encoding="utf-8")

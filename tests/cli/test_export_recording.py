@@ -3,7 +3,6 @@
 import errno
 import io
 import json
-import shutil
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -41,34 +40,15 @@ def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
     assert all(before <= after for before, after in pairwise(times))
 
 
-@pytest.mark.parametrize("link", ["itself", "symlink", "hardlink"])
-def test_the_recording_itself_is_never_written_over(link, cocalib, solved_sample, exported, tmp_path):
-    first = Path(shutil.copy(exported, tmp_path / "first.mcap"))
-    before = first.read_bytes()
-    out = first if link == "itself" else tmp_path / "other.mcap"
-    if link == "symlink":
-        out.symlink_to(first)
-    elif link == "hardlink":
-        out.hardlink_to(first)
-    done = cocalib("export", solved_sample, "--to", "mcap", "--recording", first, "--out", out, "--force")
-    assert (done.code, first.read_bytes() == before) == (2, True)
-    assert "is the recording itself, which is never changed" in done.err
-
-
-def test_a_file_that_exists_is_overwritten_only_with_force(cocalib, bags, solved_sample, tmp_path):
+def test_a_foreign_layout_is_not_written_over(cocalib, bags, solved_sample, tmp_path):
+    (tmp_path / "new.foxglove-layout.json").write_text("mine")
     typed = ("export", solved_sample, "--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap")
-    for name in ("new.mcap", "new.foxglove-layout.json"):
-        (tmp_path / name).write_text("mine")
-        done = cocalib(*typed)
-        assert done.code == 2
-        assert f"{name}: already exists" in done.err
-        assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
-        (tmp_path / name).unlink()
-    (tmp_path / "new.mcap").write_text("mine")
-    done = cocalib(*typed, "--force")
-    assert done.code == 0
-    assert "messages of the recording, unchanged; added: " in done.out
-    assert (tmp_path / "new.mcap").read_bytes()[1:5] == b"MCAP"
+    assert cocalib(*typed).code == 2
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+    for more in (("--force",), ()):
+        done = cocalib(*typed, *more)
+        assert done.code == 0
+        assert "messages of the recording, unchanged; added: " in done.out
 
 
 class Full(io.RawIOBase):
@@ -99,8 +79,6 @@ def test_nothing_half_written_stays(stop, cocalib, bags, solved_sample, tmp_path
     done = cocalib("export", solved_sample, "--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap")
     assert done.code != 0
     assert list(tmp_path.iterdir()) == []
-    if isinstance(stop, OSError):
-        assert "the disk is full: the new recording needs about" in done.err
 
 
 @pytest.mark.parametrize("to", ["mcap", "tf2", "into"])

@@ -13,6 +13,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from calib_core.errors import CalibrationError, InputError
+from calib_core.file_tag import kind_of
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange import read_calibration
 from calib_core.results import Calibration
@@ -21,6 +22,7 @@ from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, Status, read_outcome
 from cocalib.batch.plan import read_plans
 from cocalib.batch.results_folder import OUTCOME_FILE, RESULTS, ResultsFolder
 from cocalib.batch.solving import CALIBRATION_FILE
+from cocalib.platform.files import writable
 
 RESULTS_SCHEMA: Final = "cocalib/batch-results-1"
 CSV_FILE, JSON_FILE = "results.csv", "results.json"
@@ -96,11 +98,12 @@ def write_results(folder: Path, table: BatchResults) -> None:
     """Write results.csv and results.json into the folder of results.
 
     Raises:
-        CalibrationError: what has such a name is not a regular file; it was not changed.
+        CalibrationError: what has such a name is not a regular file, or not of ours; it was not changed.
         OSError: one cannot be written.
     """
-    ResultsFolder(folder).write(CSV_FILE, data=csv_bytes(table))
-    ResultsFolder(folder).write(JSON_FILE, data=json_bytes(table))
+    for name, data in ((CSV_FILE, csv_bytes(table)), (JSON_FILE, json_bytes(table))):
+        writable(folder / name, kind_of(data))
+        ResultsFolder(folder).write(name, data=data)
 
 
 def json_bytes(table: BatchResults) -> bytes:

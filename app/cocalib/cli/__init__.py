@@ -83,9 +83,12 @@ def _run(first: str = "--help", *others: str) -> int:
         raise InputError(f"{_unknown(first)}; see {PROGRAM} --help")
     if "-h" in others or "--help" in others:
         return _help(COMMANDS[first], everything=others[-1] == "all")
+    from cocalib.cli.output import kept_inputs
     from cocalib.cli.usage import read_command
 
-    return read_command(COMMANDS[first], others).run()
+    command = read_command(COMMANDS[first], others)
+    with kept_inputs(command):
+        return command.run()
 
 
 def _help(command: Command, *, everything: bool) -> int:

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +10,9 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, batch_exit_code
-from cocalib.cli.flags import File, Folder, Require, Switch, called
-from cocalib.cli.output import progress_bar, write_whole
+from cocalib.cli.flags import INPUT, Folder, OutFile, OutFolder, Output, OutputFlags, Require, Switch, called
+from cocalib.cli.output import progress_bar
+from cocalib.platform.files import require_writable, write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -27,9 +28,9 @@ class Batch:
     has no calibration, or one in doubt.
     """
 
-    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("MANIFEST|status OUT")] = ()
+    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("MANIFEST|status OUT"), INPUT] = ()
     """Sessions to calibrate (.toml); or status and the folder that batch wrote to."""
-    out: Folder = None
+    out: OutFolder = None
     """Folder for the results; beside the manifest, with its name, unless given."""
     init: Folder = None
     """Write the manifest from the recordings in this folder, for you to complete, and calibrate nothing."""
@@ -39,10 +40,11 @@ class Batch:
     """Count sessions below this verdict as failed in the exit code."""
     json: Switch = False
     """With status: print one JSON object instead of text."""
-    csv: File = None
+    csv: OutFile = None
     """With status: CSV file to write instead of printing the table."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
     """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[cluster]); who reaches it can run code."""
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Calibrate, print a table of what came of it; return the exit code."""
@@ -80,7 +82,8 @@ class Batch:
         from cocalib.batch.results_table import csv_bytes, json_bytes, read_results
         from cocalib.cli.batch_text import status_lines
 
-        if Batch(given=self.given, json=self.json, csv=self.csv) != self or (self.json and self.csv is not None):
+        taken = Batch(given=self.given, json=self.json, csv=self.csv, output=self.output)
+        if taken != self or (self.json and self.csv is not None):
             raise InputError("batch status takes --json or --csv FILE only; see cocalib batch --help")
         if len(folders) != 1:
             raise InputError(f"batch status takes OUT, the folder that batch wrote to; {len(folders)} given")
@@ -106,6 +109,9 @@ class Batch:
         from cocalib.cli.batch_text import batch_lines, shown_batch
 
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
+        if results.path.is_dir():
+            require_writable(results.path / CSV_FILE)
+            require_writable(results.path / JSON_FILE)
         try:
             warnings: list[str] = []
             engine = chosen_engine(

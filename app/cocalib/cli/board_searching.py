@@ -10,9 +10,9 @@ from calib_core.input_files import read_text
 from calib_core.interchange.own.board_views_json import read_board_views, write_board_views
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
-from cocalib.cli.output import write_whole
 from cocalib.intrinsics.picture_sources import OpenPictures
 from cocalib.intrinsics.resumed_search import ResumedSearch
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import terminal_stream
 
 _DEFAULT_VIEWS = Path("board-views.json")

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import CalibrationError, InputError
-from cocalib.cli.flags import MORE, File, Switch, called
+from cocalib.cli.flags import MORE, File, OutFile, Output, OutputFlags, Switch, called
 from cocalib.cli.judging_flags import EvidenceFlags
-from cocalib.cli.output import progress_bar, write_whole
+from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -51,11 +52,12 @@ class Check:
     """Does it still hold on this recording, by its clicks; with --against, which of the two is better there?"""
     json: Switch = False
     """Print one JSON object instead of text."""
-    junit: File = None
+    junit: OutFile = None
     """Also write the results as JUnit XML: one test case per result."""
     evidence: Annotated[EvidenceFlags, tyro.conf.arg(name=""), MORE] = field(default_factory=EvidenceFlags)
     topics: Topics = field(default_factory=TopicFlags)
     frames: Frames = field(default_factory=FrameFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Print the results; return the exit code."""

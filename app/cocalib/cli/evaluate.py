@@ -12,9 +12,10 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, NO_ANSWER, Required, exit_code
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.flags import OUTPUT, File, Output, OutputFlags, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
-from cocalib.cli.output import progress_bar, tell_choices, write_whole
+from cocalib.cli.output import progress_bar, tell_choices
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Evaluate:
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
     """A calibration in any format that import reads."""
-    report: Annotated[tuple[Path, ...], called("FILE"), tyro.conf.UseAppendAction] = ()
+    report: Annotated[tuple[Path, ...], called("FILE"), OUTPUT, tyro.conf.UseAppendAction] = ()
     """Write a report, .html, or .pdf (printed by Chrome, Chromium, Edge or Brave); may be repeated."""
     against: File = None
     """With --report: compare it with this other calibration of the same sensors."""
@@ -51,6 +52,7 @@ class Evaluate:
     json: Switch = False
     """Print one JSON object instead of text."""
     judging: Judging = field(default_factory=JudgingFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Print the figures, write the reports; return the exit code."""

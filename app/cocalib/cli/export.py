@@ -1,6 +1,5 @@
 """`cocalib export`: write a calibration in another tool's format, into a frame tree, or into a recording."""
 
-import errno
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -11,11 +10,11 @@ import tyro
 
 from calib_core.errors import InputError, RecordingError
 from calib_core.words import said_of
-from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import progress_bar, write_whole
+from cocalib.cli.flags import OUTPUT_FOLDER, Output, OutputFlags, Switch, called
+from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
-from cocalib.platform.files import writing_whole
+from cocalib.platform.files import keep, require_room, writable, write_all, write_whole, writing_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ class Export:
     """A calibration written by cocalib (cocalib/calibration-1 JSON)."""
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
     """Output format, such as tf2; "list" lists them, "all" writes every one that can hold the calibration into a folder."""
-    out: File = None
+    out: Annotated[Path | None, called("FILE"), OUTPUT_FOLDER] = None
     """Output file or folder; without it, text formats go to stdout."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
@@ -54,15 +53,14 @@ class Export:
 
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
     """For `--to mcap`: write this ROS recording again with the calibration in it, so that viewers draw returns on pictures."""
-    force: Switch = False
-    """For `--to mcap`: overwrite existing files, but never the recording itself."""
     topics: Topics = field(default_factory=TopicFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Write the export; return the exit code."""
         from calib_core.interchange import format_named, parent_pose, written_formats
 
-        if self.to == MCAP or self.recording or self.force or self.topics != TopicFlags():
+        if self.to == MCAP or self.recording or self.topics != TopicFlags():
             return self._export_recording()
         if self.trees.into:
             file = self._calibration()
@@ -115,7 +113,7 @@ class Export:
     def _export_recording(self) -> int:
         """Write the recording again with the calibration in it; return the exit code."""
         if self.to != MCAP:
-            raise InputError(f"--recording, --force and the options of a recording are for --to {MCAP}")
+            raise InputError(f"--recording and the options of a recording are for --to {MCAP}")
         if self.parent_from_radar is not None or self.rectified:
             raise InputError(f"--parent-from-radar and --rectified do not apply to --to {MCAP}")
         if len(self.calibration) != 1 or not self.recording or self.out is None:
@@ -125,7 +123,7 @@ class Export:
         if self.for_ is not None:
             raise InputError(f"--for raw does not apply to --to {MCAP}: it writes the corrections, too")
         file = _own_calibration(self.calibration[0])
-        code = _into_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
+        code = _into_recording(file, self.recording, self.out, topics=self.topics)
         _print_warnings(file)
         return code
 
@@ -134,8 +132,7 @@ def _written(out: Path, written: "Written") -> list[str]:
     """Write the files of an export; return what to say of them."""
     target = out / written.file_name if out.is_dir() else out
     files = {target: written.data} | {target.parent / extra.file_name: extra.data for extra in written.extra_files}
-    for path, data in files.items():
-        write_whole(path, data)
+    write_all(files)
     return [f"written to {path}" for path in files]
 
 
@@ -152,11 +149,10 @@ def _write_all(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made: {error.strerror or error}") from error
+    extra = {folder / each.file_name: each.data for made in written.values() for each in made.extra_files}
+    write_all({folder / made.file_name: made.data for made in written.values()} | extra)
     for name, made in written.items():
-        write_whole(folder / made.file_name, made.data)
         print(f"{name}: written to {folder / made.file_name}")
-        for extra in made.extra_files:
-            write_whole(folder / extra.file_name, extra.data)
     for one in refused:
         print(f"{one.name}: not written: {one.reason}")
     _print_warnings(file)
@@ -187,9 +183,7 @@ def _own_calibration(path: Path) -> "CalibrationFile":
     return consistent_file(read_any_file(path), str(path))
 
 
-def _into_recording(
-    file: "CalibrationFile", paths: Sequence[Path], out: Path, *, topics: TopicFlags, force: bool
-) -> int:
+def _into_recording(file: "CalibrationFile", paths: Sequence[Path], out: Path, *, topics: TopicFlags) -> int:
     """Write the new recording and a layout for Foxglove beside it; return the exit code.
 
     Args:
@@ -197,7 +191,6 @@ def _into_recording(
         paths: of the recording.
         out: the new recording.
         topics: of the recording; those of the calibration where the user names none.
-        force: overwrite existing files.
 
     Raises:
         InputError: a file cannot be written, or the calibration is not of this recording.
@@ -212,12 +205,10 @@ def _into_recording(
         raise InputError(f"{out}: the new recording is an MCAP file; name it NAME.mcap")
     layout = out.with_name(out.stem + _LAYOUT_ENDING)
     with _opened(paths, topics, file.provenance) as recording:
-        _refuse_overwriting(recording, (out, layout), force=force)
-        try:
-            with writing_whole(out) as stream, progress_bar("writing messages") as progress:
-                written = write_into_recording(recording, file, stream, version=version(), progress=progress)
-        except OSError as error:
-            raise InputError(f"{out}: {_why(error, recording)}") from error
+        writable(layout)
+        require_room(out, sum(source.size_bytes for source in recording.sources))
+        with writing_whole(out) as stream, progress_bar("writing messages") as progress:
+            written = write_into_recording(recording, file, stream, version=version(), progress=progress)
         write_whole(layout, written.layout)
         _report(recording, written, out, layout)
     return 0
@@ -236,38 +227,12 @@ def _opened(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance")
             map=provenance.column_map,
         )
         try:
-            return open_recording(tuple(paths), like_before, require=("image",))
+            recording = open_recording(tuple(paths), like_before, require=("image",))
+            keep(recording.files)
+            return recording
         except RecordingError:
             pass  # another recording of the same sensors may have other topics
     return topics.open(tuple(paths), ("image",))
-
-
-def _refuse_overwriting(recording: "Recording", files: Sequence[Path], *, force: bool) -> None:
-    """Refuse to write over the recording, and over anything else unless told to.
-
-    Raises:
-        InputError: one of the files exists.
-    """
-    for file in files:
-        if not file.exists():
-            continue
-        for original in (*recording.paths, *(source.path for source in recording.sources)):
-            if original.exists() and original.samefile(file):
-                raise InputError(
-                    f"{file}: is the recording itself, which is never changed; choose another name for --out"
-                )
-        if not force:
-            raise InputError(f"{file}: already exists; choose another name, or overwrite it with --force")
-
-
-def _why(error: OSError, recording: "Recording") -> str:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        size_gb = sum(source.size_bytes for source in recording.sources) / 1e9
-        return (
-            f"the disk is full: the new recording needs about {size_gb:.3g} GB; nothing was left behind. Free some space, or "
-            "write to another disk"
-        )
-    return f"cannot be written: {error.strerror or error}"
 
 
 def _report(recording: "Recording", written: "RecordingWritten", out: Path, layout: Path) -> None:

@@ -1,6 +1,7 @@
 """Flags that several commands share, and the names of values in the help."""
 
 import dataclasses
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
@@ -23,8 +24,24 @@ def same(options: type[Any], name: str) -> Any:
     return dataclasses.field(default=found.default, metadata=found.metadata)
 
 
+INPUT, OUTPUT, OUTPUT_FOLDER = "input", "output", "output folder"
+"""Mark what a flag names: a file that is read, as every path without a mark; a file that is written; a folder for such files."""
+
 File: TypeAlias = Annotated[Path | None, called("FILE")]
 Folder: TypeAlias = Annotated[Path | None, called("FOLDER")]
+OutFile: TypeAlias = Annotated[Path | None, called("FILE"), OUTPUT]
+OutFolder: TypeAlias = Annotated[Path | None, called("FOLDER"), OUTPUT_FOLDER]
 Switch: TypeAlias = Annotated[bool, called()]
 MoreSwitch: TypeAlias = Annotated[bool, called(), MORE]
 Require: TypeAlias = Annotated[Required | None, called("{good,usable}")]
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFlags:
+    """What an output may replace."""
+
+    force: MoreSwitch = False
+    """Let an output replace a file that cocalib did not write; never one that is read."""
+
+
+Output: TypeAlias = Annotated[OutputFlags, tyro.conf.arg(name=""), MORE]

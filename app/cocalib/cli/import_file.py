@@ -10,10 +10,10 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import NO_ANSWER, exit_code
-from cocalib.cli.flags import File, Require, Switch, called
-from cocalib.cli.output import refuse_input, write_whole
+from cocalib.cli.flags import File, OutFile, Output, OutputFlags, Require, Switch, called
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
+from cocalib.platform.files import write_whole
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -35,7 +35,7 @@ class MeaningFlags:
     """Which pose, if the file contains several: its sensor, or its place in the file, such as calibration.radar.T."""
     as_: Annotated[str | None, tyro.conf.arg(name="as", metavar="MEANING", help_behavior_hint="")] = None
     """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
-    sheet: File = None
+    sheet: OutFile = None
     """Draw each meaning over a frame of --recording and write the picture here (PNG)."""
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
     """A recording of these sensors, one file or several: --sheet draws over one of its frames."""
@@ -209,7 +209,7 @@ class Import:
 
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FILE...")] = ()
     """A calibration in any format, or any file with a pose, from any program; or files, a folder or a recording with a tree."""
-    out: File = None
+    out: OutFile = None
     """Output file (calibration-1 JSON)."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
@@ -225,6 +225,7 @@ class Import:
     """Exit code 3 for a verdict below this."""
     frames: Frames = field(default_factory=FrameFlags)
     meaning: Annotated[MeaningFlags, tyro.conf.arg(name="")] = field(default_factory=MeaningFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Write the calibration; return the exit code, as of no answer if its numbers may mean several things."""
@@ -241,7 +242,6 @@ class Import:
             raise InputError(
                 "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
             )
-        refuse_input(self.out, *self.calibration, self.camera, self.pairs, self.against)
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
         given = read_camera_file(self.camera) if self.camera else None
         against = read_any_file(self.against) if self.against else None

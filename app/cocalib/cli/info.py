@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
 from cocalib.cli.flags import Switch
-from cocalib.cli.output import progress_bar, write_whole
+from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.platform.files import write_whole
 
 if TYPE_CHECKING:
     from calib_core.recordings import Recording

@@ -13,8 +13,9 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import LensChoice
 from calib_core.recordings import RecordingOptions
-from cocalib.cli.flags import MORE, File, Folder, Switch, called, same
-from cocalib.cli.output import explain_unsolvable, refuse_input, write_whole
+from cocalib.cli.flags import MORE, OutFile, OutFolder, Output, OutputFlags, Switch, called, same
+from cocalib.cli.output import explain_unsolvable
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -81,17 +82,17 @@ class Intrinsics:
     """A recording, a video, a folder of pictures or picture files of one camera; or a file with intrinsics."""
     image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
     board: BoardUsed = field(default_factory=BoardFlags)
-    out: File = None
+    out: OutFile = None
     """Write the intrinsics to this file (ROS camera_info YAML unless --to or the suffix says otherwise)."""
     to: Annotated[str | None, called("FORMAT")] = None
     """Format of the intrinsics: ros, kalibr, opencv, opencv-xml, opencv-json, mrcal, colmap, kitti, matlab, json."""
     rescale: Annotated[str | None, called("WIDTHxHEIGHT")] = None
     """With a file with intrinsics: convert them to the same pictures, resized to this size [px]."""
-    views: File = None
+    views: OutFile = None
     """File of the views found (cocalib/board-views-1 JSON): read if it is there, to resume a search; written at the end."""
-    report: File = None
+    report: OutFile = None
     """Write a report on the lens to this file (.html)."""
-    rectified: Folder = None
+    rectified: OutFolder = None
     """Write the used pictures without the distortion into this folder, with straight lines to judge it by."""
     json: Switch = False
     """Print everything as JSON (cocalib/intrinsics-1)."""
@@ -99,6 +100,7 @@ class Intrinsics:
     """List every view and every picture that was left out."""
     model: Annotated[LensChoice, MORE] = "auto"
     """Lens model; auto takes the simplest that predicts views it has not seen as well as any."""
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Calibrate or convert; return the exit code."""
@@ -128,7 +130,6 @@ class Intrinsics:
                 "options, give the recording, video or pictures of the board"
             )
         require_format(self.to)
-        refuse_input(self.out, Path(self.source[0]))
         size_px = size_of(self.rescale) if self.rescale is not None else None
         return convert_camera(self.source[0], to=self.to, out=self.out, size_px=size_px)
 
@@ -136,13 +137,10 @@ class Intrinsics:
         """Refuse files that could not be written, before the search.
 
         Raises:
-            InputError: one has another suffix than its content, or a folder is missing.
+            InputError: one has another suffix than its content.
         """
         if self.report is not None and self.report.suffix.lower() not in (".html", ".htm"):
             raise InputError(f"{self.report}: the report is an .html file; name it NAME.html")
-        for path in (self.out, self.views, self.report):
-            if path is not None and not path.absolute().parent.is_dir():
-                raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
         from cocalib.cli.lens_output import require_format
 
         require_format(self.to)

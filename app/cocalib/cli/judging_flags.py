@@ -9,10 +9,11 @@ import tyro
 
 from calib_core.errors import InputError, NoAnswerError
 from calib_core.input_files import read_text
-from cocalib.cli.flags import MORE, File, called
+from cocalib.cli.flags import INPUT, MORE, File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import Recorded, RecordedFlags, TopicFlags
 from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.platform.files import keep
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -28,7 +29,7 @@ class EvidenceFlags:
 
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON); by default those of its session, or those kept in the calibration."""
-    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC"), INPUT] = None
     """Boxes around moving objects, from a file or a topic of the recording: returns in them give Acc."""
     labels: File = None
     """With --boxes: the true origin of each return (cocalib/labels-1 JSON of a simulation), which then decides."""
@@ -130,6 +131,7 @@ class EvidenceFlags:
             return told_clicks_at_frames(clicks, recording, source=str(self.clicks))
         folder = recording_session_folder(paths)
         if folder.is_dir():
+            keep((folder,))
             return tuple(inspect_session(folder).clicks)
         times = recording.image_times if len(recording.image_times) else recording.radar_times
         if not len(times):

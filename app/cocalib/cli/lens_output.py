@@ -20,8 +20,8 @@ from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from calib_core.words import in_sentences, outcome_told
 from calib_core.words.intrinsics import halves_text, residuals_text
-from cocalib.cli.output import write_whole
 from cocalib.intrinsics.field_of_view import field_of_view_text
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 from cocalib.view.wording import plain, sentence, with_sigma
 

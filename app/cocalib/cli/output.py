@@ -1,13 +1,15 @@
-"""Shared by the commands: reading and writing files, what is printed to stderr, progress."""
+"""Shared by the commands: which files they read and write, what is printed to stderr, progress."""
 
-import re
+import dataclasses
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from calib_core.errors import InputError
+from cocalib.cli.flags import INPUT, OUTPUT, OUTPUT_FOLDER, OutputFlags
 from cocalib.platform import files
 from cocalib.platform.terminal import terminal_stream
 
@@ -52,44 +54,39 @@ def _flag(part: "OptionPart") -> str:
     return f"{_FLAGS[part.option]} {value}" if part.option in _FLAGS else f"--set {part.option}={value}"
 
 
-def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> None:
-    """Write a file atomically: a reader finds the old or the new content, never a part.
-
-    Args:
-        path: of the file.
-        content: of it.
-        again: it is a file that was read and changed: it keeps its mode and owner, and a read-only one is refused.
+@contextmanager
+def kept_inputs(command: object) -> Iterator[None]:
+    """Keep what a command reads from being written over while it runs, and refuse what it may not write before it begins.
 
     Raises:
-        InputError: the folder is missing or not writable, or holds a file of this name and of another kind.
+        InputError: an output is an input, a file of another program, or named twice.
     """
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    try:
-        if not again and path.is_file() and (old := path.read_bytes()) and _kind(old) != _kind(data):
-            raise InputError(
-                f"{path}: holds something else, which is not overwritten; choose another name, or remove it"
-            )
-        (files.rewrite_whole if again else files.write_whole)(path, data)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    named = list(_named_files(command))
+    inputs = [one for path, mark in named if mark == INPUT for one in (path, Path(str(path).partition("#")[0]))]
+    outputs = [path for path, mark in named if mark == OUTPUT or (mark == OUTPUT_FOLDER and not _may_be_folder(path))]
+    output: OutputFlags = getattr(command, "output", OutputFlags())
+    with files.keeping(inputs, force=output.force):
+        for path in outputs:
+            files.require_writable(path)
+        if twice := next((path for path in outputs if outputs.count(path) > 1), None):
+            raise InputError(f"{twice}: is named for two outputs; give each a name of its own")
+        yield
 
 
-def refuse_input(out: Path | None, *inputs: Path | None) -> None:
-    """Refuse an output that is one of the files that are read.
-
-    Raises:
-        InputError: it is.
-    """
-    if out and out.exists() and any(one and one.exists() and out.samefile(one) for one in inputs):
-        raise InputError(f"{out}: is also an input, which is never changed; choose another name for --out")
+def _may_be_folder(path: Path) -> bool:
+    return path.is_dir() or not os.path.lexists(path)
 
 
-def _kind(data: bytes) -> bytes:
-    """Return what tells kinds of output apart: our JSON by its schema, our other texts by a word, the rest by how it begins."""
-    if b"camera_matrix:" in data and b"camera_name:" in data:
-        return b"camera_info"
-    schema = re.search(rb'"schema": ?"(cocalib/[\w-]+)"', data[:200])
-    return schema[1] if schema else b"cocalib" if b"cocalib" in data and b"\0" not in data else data[:4]
+def _named_files(flags: Any) -> Iterator[tuple[Path, str]]:
+    """Yield the files that flags name, each with its mark; what has none is read."""
+    for flag in dataclasses.fields(flags):
+        value, marks = getattr(flags, flag.name), getattr(flag.type, "__metadata__", ())
+        mark = next((mark for mark in (INPUT, OUTPUT, OUTPUT_FOLDER) if mark in marks), None)
+        if dataclasses.is_dataclass(value):
+            yield from _named_files(value)
+        for each in value if isinstance(value, tuple) else (value,):
+            if isinstance(each, Path) or (mark and each is not None):
+                yield Path(each), mark or INPUT
 
 
 @contextmanager

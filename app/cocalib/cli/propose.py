@@ -4,11 +4,11 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import CalibrationOptions, checked_options
-from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
+from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices
 from cocalib.cli.recording_flags import CameraFlags, RecordedFlags, checked_reflector_m
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -56,7 +56,6 @@ def propose(
 
     options = checked_options(options)
     reflector_m = checked_reflector_m(reflector_m)
-    _require_folder(shown.out)
     camera_file = camera.read()
     clicks: tuple[ReflectorClick, ...] = () if clicks_file is None else file_of_clicks(clicks_file).clicks
     with recorded.open() as recording:
@@ -74,16 +73,6 @@ def propose(
         if not found[1].ranked and not any(click.counts for click in clicks):
             return _explain_nothing(found[1], recording)
         return _deliver(shown, *found, recording, clicks, reflector_m)
-
-
-def _require_folder(out: "Path | None") -> None:
-    """Refuse an output file that cannot be written, before the search.
-
-    Raises:
-        InputError: its folder is missing.
-    """
-    if out is not None and not out.absolute().parent.is_dir():
-        raise InputError(f"{out}: the folder {out.parent} does not exist; create it first")
 
 
 def _explain_nothing(proposals: "Proposals", recording: "Recording") -> int:

@@ -20,6 +20,7 @@ from calib_core.options import (
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import MORE, File, MoreSwitch, called, same
 from cocalib.cli.named_options import Settings, with_named
+from cocalib.platform.files import keep
 
 if TYPE_CHECKING:
     from calib_core.interchange import CameraFile, VehicleNote
@@ -59,6 +60,7 @@ class TopicFlags(RecordingOptions):
         from calib_core.recordings import open_recording
 
         recording = open_recording(paths, self, require=require)
+        keep(recording.files)
         if recording.recording_file:
             print(recording.recording_file, file=sys.stderr)
         return recording

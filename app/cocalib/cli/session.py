@@ -1,7 +1,7 @@
 """`cocalib session`: list, repair and export sessions."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,8 +10,8 @@ import tyro
 
 from calib_core.errors import InputError
 from calib_core.input_files import no_such
-from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import write_whole
+from cocalib.cli.flags import OutFile, Output, OutputFlags, Switch, called
+from cocalib.platform.files import write_whole
 
 if TYPE_CHECKING:
     from cocalib.session.file import Repair, SessionSummary
@@ -29,8 +29,9 @@ class Session:
     """With list: print JSON instead of text."""
     yes: Switch = False
     """With repair: write what can be kept; the old files are kept as backups."""
-    out: File = None
+    out: OutFile = None
     """With export: output file (cocalib/clicks-1 JSON)."""
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Run the action; return the exit code."""
@@ -50,6 +51,7 @@ class Session:
             ("--json", self.json, "list"),
             ("--yes", self.yes, "repair"),
             ("--out", self.out is not None, "export"),
+            ("--force", self.output.force, "export"),
         ):
             if given and self.action != action:
                 raise InputError(f"{name} applies to session {action} only; see cocalib session --help")

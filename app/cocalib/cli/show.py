@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from calib_core.errors import InputError
 from calib_core.input_files import read_text
-from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import progress_bar, refuse_input, told_clicks_at_frames
+from cocalib.cli.flags import INPUT, File, OutFile, Output, OutputFlags, Switch, called
+from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, Recorded, RecordedFlags
+from cocalib.platform.files import whole_path
 
 if TYPE_CHECKING:
     from cocalib.recorded_view import RecordedView
@@ -27,14 +28,14 @@ class Show:
     Without --calibration, the video has the camera's frames only, each at its recorded time; recorded JPEG is not re-encoded.
     """
 
-    out: File = None
+    out: OutFile = None
     """Output file instead of a window: .rrd for Rerun, or a video, .mp4, .mov or .mkv."""
     calibration: File = None
     """Calibration to project the returns with, in any format that export writes."""
     camera: GivenCamera = field(default_factory=CameraFlags)
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
-    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC"), INPUT] = None
     """Boxes around objects, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
     against: File = None
     """Another calibration, whose returns are shown too."""
@@ -47,6 +48,7 @@ class Show:
     port: Annotated[int, called("PORT")] = 0
     """With --web: the port; 0 takes a free one."""
     recorded: Recorded = field(default_factory=RecordedFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Show or write it; return the exit code."""
@@ -54,7 +56,6 @@ class Show:
             return self._show()
         if self.web or self.port:
             raise InputError("--web and --port show a window; remove --out to open it")
-        refuse_input(self.out, *self.recorded.recording)
         if self.out.suffix.lower() == ".rrd":
             return self._write_rrd(self.out)
         return self._write_frames(self.out) if self.calibration is None else self._write_overlay(self.out)
@@ -85,14 +86,19 @@ class Show:
         return 0
 
     def _write_frames(self, out: Path) -> int:
-        if Show(out=out, recorded=self.recorded) != self:
+        if Show(out=out, recorded=self.recorded, output=self.output) != self:
             raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
-        from calib_core.recordings import write_video
+        from calib_core.recordings import video_format, write_video
         from calib_core.words import told
         from cocalib.solving.recorded_clicks import seconds_text
 
-        with self.recorded.open(require=("image",)) as recording, progress_bar("writing frames") as progress:
-            written = write_video(recording, out, progress=progress)
+        video_format(out)
+        with (
+            self.recorded.open(require=("image",)) as recording,
+            whole_path(out) as part,
+            progress_bar("writing frames") as progress,
+        ):
+            written = write_video(recording, part, progress=progress)
         print(f"{out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import tyro
 
-from calib_core.errors import InputError
 from calib_core.synthetic import PRESETS, PresetName, SimulationOptions
 from calib_core.synthetic.options import Container
-from cocalib.cli.flags import File
+from cocalib.cli.flags import OUTPUT_FOLDER, File
 from cocalib.cli.named_options import Settings, with_named
 from cocalib.cli.output import progress_bar
+from cocalib.platform.files import require_room, whole_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class Simulate:
 
     NAMED = SimulationOptions
 
-    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER"), OUTPUT_FOLDER]
     """Output folder; created if missing, must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
     """Files to write: ros1 (radar.bag and camera.bag), mcap, db3; without ROS: dated pictures, and the radar as csv or jsonl."""
@@ -34,11 +34,12 @@ class Simulate:
     def run(self) -> int:
         """Write the recording; return the exit code."""
         from calib_core.synthetic import simulate, write_recording
+        from calib_core.synthetic.files import pictures_size_bytes
 
-        options = with_named(PRESETS[self.preset], self.set, self.options)
-        if self.out.exists() and (not self.out.is_dir() or any(self.out.iterdir())):
-            raise InputError(f"{self.out}: not an empty folder; choose an empty or a new one")
-        with progress_bar("rendering frames") as progress:
-            paths = write_recording(simulate(options), self.out, containers=self.containers, progress=progress)
-        print("\n".join(str(path) for path in paths))
+        recording = simulate(with_named(PRESETS[self.preset], self.set, self.options))
+        with whole_folder(self.out) as part:
+            require_room(self.out, len(self.containers) * pictures_size_bytes(recording))
+            with progress_bar("rendering frames") as progress:
+                paths = write_recording(recording, part, containers=self.containers, progress=progress)
+        print("\n".join(str(self.out / path.relative_to(part)) for path in paths))
         return 0

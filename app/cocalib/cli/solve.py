@@ -14,15 +14,13 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from cocalib.cli.exit_codes import exit_code
-from cocalib.cli.flags import MORE, File, MoreSwitch, Require, Switch
+from cocalib.cli.flags import MORE, File, MoreSwitch, OutFile, Output, OutputFlags, Require, Switch
 from cocalib.cli.output import (
     explain_unsolvable,
     on_terminal,
     recorded_clicks,
-    refuse_input,
     shown_progress,
     tell_choices,
-    write_whole,
 )
 from cocalib.cli.recording_flags import (
     CameraFlags,
@@ -36,6 +34,7 @@ from cocalib.cli.recording_flags import (
     VehicleFlags,
     checked_reflector_m,
 )
+from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 from cocalib.view import summary_lines
 
@@ -63,7 +62,7 @@ class Solve:
     """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
     propose: Switch = False
     """Solve nothing: list where the reflector probably stood, for a person or a script to confirm; --out keeps it as JSON."""
-    clicks_out: File = None
+    clicks_out: OutFile = None
     """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
     reflector_m: Annotated[float, MORE] = _REFLECTOR_M
     """With --auto or --propose: width of the reflector as the camera sees it [m]."""
@@ -73,7 +72,7 @@ class Solve:
     """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV of x, y, z, u, v), or a
     calibration to solve again."""
     camera: GivenCamera = field(default_factory=CameraFlags)
-    out: File = None
+    out: OutFile = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: MoreSwitch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
@@ -82,6 +81,7 @@ class Solve:
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     recorded: Recorded = field(default_factory=RecordedFlags)
     options: Options = field(default_factory=OptionFlags)
+    output: Output = field(default_factory=OutputFlags)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -89,7 +89,6 @@ class Solve:
             return self._propose()
         vehicle = self.vehicle.note()
         self._require_fitting()
-        refuse_input(self.out, self.pairs)
         return self._solve_recording(vehicle) if self.pairs is None else self._solve_pairs(self.pairs, vehicle)
 
     def _require_fitting(self) -> None:
@@ -128,6 +127,7 @@ class Solve:
             out=self.out,
             recorded=self.recorded,
             options=self.options,
+            output=self.output,
         )
         if fitting != self:
             raise InputError(

@@ -13,7 +13,7 @@ import tyro
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from cocalib.cli.flags import MORE, File, Switch, called
-from cocalib.cli.output import write_whole
+from cocalib.platform.files import keep, write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -44,11 +44,9 @@ class FrameFlags:
         Raises:
             InputError: one cannot be read, or a folder contains none.
         """
-        from calib_core.interchange import tree_files
-
         if any(map(_holds_recording, paths)) and not _is_plain_mcap(paths):
             return None
-        return tree_files(paths)
+        return _kept_files(paths)
 
     def read(
         self, paths: Sequence[Path], files: "tuple[TreeFile, ...] | None" = None
@@ -110,11 +108,11 @@ class TreeFlags:
         Raises:
             InputError: the joint cannot be chosen or changed, or options contradict each other.
         """
-        from calib_core.interchange import patched, tree_files
+        from calib_core.interchange import patched
 
         if to != "list":
             raise InputError("--into changes an existing file, --to writes a new one; give one of them")
-        files = tree_files(self.into)
+        files = _kept_files(self.into)
         known = _tree_of(self.tree).joints if self.tree else ()
         change = patched(files, known, file, frames.wanted, joint=self.joint)
         for line in (f"solved for {change.why}", *(f"note: {note}" for note in change.notes)):
@@ -127,7 +125,7 @@ class TreeFlags:
             print_exactly(change.diff())
             print("nothing is written; --write changes the file, --out FILE writes a copy", file=sys.stderr)
             return 0
-        write_whole(target, change.data, again=target == Path(change.source))
+        write_whole(target, change.data, again=out is None)
         print(f"written to {target}")
         return 0
 
@@ -158,17 +156,30 @@ def input_file(file: "TreeFile") -> "InputFile":
     return InputFile(name_text(Path(file.source).name), len(file.data), hashlib.sha256(file.data).hexdigest())
 
 
+def _kept_files(paths: Sequence[Path]) -> "tuple[TreeFile, ...]":
+    """Read the files that make a frame tree; none of them is written over.
+
+    Raises:
+        InputError: one cannot be read, or a folder contains none.
+    """
+    from calib_core.interchange import tree_files
+
+    files = tree_files(paths)
+    keep(Path(file.source) for file in files)
+    return files
+
+
 def _tree_of(paths: Sequence[Path]) -> "FrameTree":
     """Read the frame tree of files, folders and recordings together.
 
     Raises:
         InputError: a path cannot be read, has no transforms, or they make no tree.
     """
-    from calib_core.interchange import Joint, Place, WrittenPose, joined_tree, tree_files
+    from calib_core.interchange import Joint, Place, WrittenPose, joined_tree
     from calib_core.recordings import frame_transforms
 
     recordings = [path for path in paths if _holds_recording(path)]
-    files = tree_files([path for path in paths if path not in recordings])
+    files = _kept_files([path for path in paths if path not in recordings])
     joints: list[Joint] = []
     for path in recordings:
         for transform in frame_transforms([path]):

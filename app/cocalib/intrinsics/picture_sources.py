@@ -15,6 +15,7 @@ from calib_core.errors import InputError, MessageError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import Recording, RecordingOptions, holds_recording, open_recording, require_files
+from cocalib.platform.files import keep
 
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _PICTURE_HEAD_BYTES = 1 << 16
@@ -253,6 +254,7 @@ def open_pictures(paths: Sequence[Path], options: RecordingOptions | None = None
     (kind,) = kinds
     if kind == "a recording":
         with open_recording(found, options, require=("image",)) as recording:
+            keep(recording.files)
             yield RecordedPictures(recording)
         return
     if options is not None and options.image_topic is not None:
@@ -266,7 +268,9 @@ def open_pictures(paths: Sequence[Path], options: RecordingOptions | None = None
         finally:
             video.close()
         return
-    yield FilePictures(_files(found, kind))
+    files = _files(found, kind)
+    keep(files)
+    yield FilePictures(files)
 
 
 def spelled_out(paths: Sequence[Path]) -> tuple[Path, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.intrinsics import CalibratedLens, LensView
+from cocalib.hypothesis_sheet import png
 from cocalib.intrinsics.picture_sources import OpenPictures
 
 _COLOUR = (80, 220, 255)
@@ -34,7 +35,7 @@ def rectified_pictures(pictures: OpenPictures, lens: CalibratedLens) -> Iterator
         drawn = cv2.remap(picture, maps.x_px, maps.y_px, cv2.INTER_LINEAR)
         for begin, end in _guides(lens, view, straight):
             cv2.line(drawn, begin, end, _COLOUR, 1, cv2.LINE_AA)
-        yield view.corners.name, bytes(cv2.imencode(".png", drawn)[1].tobytes())
+        yield view.corners.name, png(drawn)
 
 
 def _guides(

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from calib_core.input_files import name_text
-from cocalib.platform.files import write_whole
+from cocalib.platform.files import replace_file
 from cocalib.platform.resources import state_folder
 from cocalib.web.messages import RecentRecording
 
@@ -88,7 +88,7 @@ class RecentRecordings:
     def _write(self, entries: list[_Entry]) -> None:
         try:
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_whole(self._path, msgspec.json.encode(entries))
+            replace_file(self._path, msgspec.json.encode(entries))
             self._path.chmod(0o600)
         except (OSError, UnicodeEncodeError) as error:
             _log.warning("%s: the list of recent recordings cannot be written: %s", self._path, error)

@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
+from calib_core.file_tag import TAG
+
 _EMPTY = frozenset(
     {"br", "col", "hr", "image", "img", "line", "link", "meta", "path", "rect", "circle", "polygon", "use"}
 )
@@ -91,6 +93,7 @@ def html_file(title: str, body: Markup) -> str:
         tag("meta", charset="utf-8"),
         tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", name="generator", content=TAG),
         tag("title", title),
         Markup(f"<style>{_style()}</style>"),
     )

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from calib_core.errors import CalibrationError
+from calib_core.file_tag import TAG
 
 _VARIABLE = "COCALIB_BROWSER"
 _NAMES = (
@@ -86,7 +87,7 @@ def print_pdf(html: str) -> bytes:
             raise PrintingError(
                 f"{browser} printed no PDF (exit code {answer.returncode}){why}; print the HTML file from your browser"
             )
-        return pdf.read_bytes()
+        return pdf.read_bytes() + f"%{TAG}\n".encode()
 
 
 def find_browser() -> Path:

@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.errors import InputError, MessageError
+from calib_core.errors import MessageError
 from calib_core.measurements import Box, TimeNs
 from calib_core.recordings import SkippedFrames
 from calib_core.results import PairResult
@@ -36,7 +36,6 @@ from cocalib.rerun.unmoving import (
 
 _AGAINST = (230, 120, 230)
 _CHUNK_BYTES = 4 << 20
-_PATIENCE_S = 60.0
 _HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
 _BACKGROUND = (13, 16, 20)
 
@@ -64,7 +63,7 @@ def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[Tim
             stream.send_columns(
                 RETURNS, [_times(scans.times_ns)], columns.partition(np.diff(scans.first_return).tolist())
             )
-            flush(stream)
+            stream.flush()  # what is not on the disk yet stays in memory
         yield scans.times_ns
 
 
@@ -111,7 +110,7 @@ def _send_pictures(
 ) -> None:
     columns = rr.EncodedImage.columns(blob=pictures, media_type=formats)
     stream.send_columns(PICTURE, [_times(np.array(times, dtype=np.int64))], columns)
-    flush(stream)
+    stream.flush()
     streamed.frames += len(pictures)
 
 
@@ -221,18 +220,6 @@ def stream_figures(stream: rr.RecordingStream, view: RecordedView) -> None:
         times = np.array([time for time, _ in acc], dtype=np.int64)
         shares = 100.0 * np.array([share for _, share in acc])
         stream.send_columns(ACC, [_times(times)], rr.Scalars.columns(scalars=shares))
-
-
-def flush(stream: rr.RecordingStream) -> None:
-    """Wait until all is written: what is not on the disk yet stays in memory.
-
-    Raises:
-        InputError: it is not written in time; once Rerun's writer has failed, it never is.
-    """
-    try:
-        stream.flush(timeout_sec=_PATIENCE_S)
-    except RuntimeError as error:
-        raise InputError(f"Rerun's writer does not go on ({error}); write to another disk") from error
 
 
 def _times(times_ns: TimesNs) -> rr.TimeColumn:

@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
+from calib_core.file_tag import TAG
 from calib_core.lens_models.registry import LENS_MODELS, lenses_named, opencv_lens
 
 
@@ -132,6 +133,9 @@ def found_or_refused(name: str, read: Callable[[], FoundCamera]) -> FoundCamera:
         return FoundCamera(name, "", (0.0,) * 9, (), None, refused=str(error))
 
 
+HASH_TAG = f"# {TAG}\n"
+
+
 @dataclass(frozen=True, slots=True)
 class OwnSyntax:
     """How a format is read whose files are neither JSON nor YAML nor OpenCV's XML.
@@ -155,6 +159,7 @@ class CameraFormat:
         suffix: usual for its files.
         write: the file's content for a camera and its name; raises InputError for a camera that the format cannot store.
         own_syntax: how it is read if its syntax is its own; None if its keys say it.
+        ending: the comment that tells whose file it is; "" if the content does.
     """
 
     name: str
@@ -162,6 +167,7 @@ class CameraFormat:
     suffix: str
     write: Callable[[Camera, str], str | bytes]
     own_syntax: OwnSyntax | None = None
+    ending: str = ""
 
 
 def refuse_skew(camera: Camera, whose: str) -> None:

@@ -5,6 +5,7 @@ from functools import partial
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.file_tag import TAG
 from calib_core.interchange.cameras.camera_format import (
     CameraFormat,
     FoundCamera,
@@ -93,7 +94,8 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
 
 
 def _write(camera: Camera, _name: str) -> str:
-    return f"# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]; the first pixel's centre is at (0.5, 0.5)\n{colmap_camera_line(camera)}"
+    columns = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]; the first pixel's centre is at (0.5, 0.5)"
+    return f"# {TAG}\n{columns}\n{colmap_camera_line(camera)}"
 
 
 COLMAP_CAMERAS = CameraFormat("colmap", "COLMAP cameras.txt", ".txt", _write, OwnSyntax(_recognizes, _read))

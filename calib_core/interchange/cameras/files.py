@@ -211,4 +211,6 @@ def camera_content(camera: Camera, to: str, name: str = "camera") -> str | bytes
     """
     if to not in CAMERA_FORMATS:
         raise InputError(f"no format {to!r} for intrinsics; {meant(to, CAMERA_FORMATS)}")
-    return CAMERA_FORMATS[to].write(camera, name)
+    form = CAMERA_FORMATS[to]
+    content = form.write(camera, name)
+    return content + form.ending if isinstance(content, str) else content

@@ -1,7 +1,7 @@
 """Kalibr's camera chain."""
 
 from calib_core.camera import Camera
-from calib_core.interchange.cameras.camera_format import CameraFormat, refuse_skew
+from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.registry import WrittenLens, written_lens
 
@@ -34,4 +34,4 @@ def _write(camera: Camera, _name: str) -> str:
     return kalibr_camera_text(camera)
 
 
-KALIBR_CHAIN = CameraFormat("kalibr", "Kalibr camchain YAML", ".yaml", _write)
+KALIBR_CHAIN = CameraFormat("kalibr", "Kalibr camchain YAML", ".yaml", _write, ending=HASH_TAG)

@@ -4,6 +4,7 @@ import re
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.file_tag import TAG
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, refuse_skew
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.syntax.yaml_text import numbers_text
@@ -58,7 +59,7 @@ def _write(camera: Camera, _name: str) -> str:
     if lens.name != "plumb_bob" or len(lens.coefficients) != 5:
         raise InputError(f"KITTI's files have no {camera.model} lens; write ros, kalibr, opencv, colmap or json")
     return (
-        "corner_dist: 0.0\n"
+        f"calib_time: {TAG}\ncorner_dist: 0.0\n"
         f"S_00: {numbers_text((float(camera.width_px), float(camera.height_px)), ' ')}\n"
         f"K_00: {numbers_text(camera.matrix_px.ravel(), ' ')}\n"
         f"D_00: {numbers_text(lens.coefficients, ' ')}\n"

@@ -6,7 +6,7 @@ from typing import Any
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, refuse_skew
+from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, FoundCamera, OwnSyntax, refuse_skew
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
@@ -78,4 +78,4 @@ def _dictionary(text: str, *, source: str) -> Mapping[str, Any]:
     return values
 
 
-MRCAL = CameraFormat("mrcal", "mrcal cameramodel", ".cameramodel", _write, OwnSyntax(_recognizes, _read))
+MRCAL = CameraFormat("mrcal", "mrcal cameramodel", ".cameramodel", _write, OwnSyntax(_recognizes, _read), HASH_TAG)

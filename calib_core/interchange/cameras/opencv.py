@@ -5,7 +5,8 @@ import json
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.cameras.camera_format import CameraFormat, refuse_skew
+from calib_core.file_tag import TAG
+from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.registry import WrittenLens, written_lens
 
@@ -53,6 +54,7 @@ def _write_json(camera: Camera, name: str) -> str:
     lens = _lens(camera)
     matrices = {"camera_matrix": camera.matrix_px, "distortion_coefficients": np.array([lens.coefficients])}
     content = {
+        "comment": TAG,
         "camera_name": name,
         "image_width": camera.width_px,
         "image_height": camera.height_px,
@@ -70,6 +72,6 @@ def _write_json(camera: Camera, name: str) -> str:
     return json.dumps(content, indent=4) + "\n"
 
 
-OPENCV_YAML = CameraFormat("opencv", "OpenCV FileStorage YAML", ".yml", _write_yaml)
-OPENCV_XML = CameraFormat("opencv-xml", "OpenCV FileStorage XML", ".xml", _write_xml)
+OPENCV_YAML = CameraFormat("opencv", "OpenCV FileStorage YAML", ".yml", _write_yaml, ending=HASH_TAG)
+OPENCV_XML = CameraFormat("opencv-xml", "OpenCV FileStorage XML", ".xml", _write_xml, ending=f"<!-- {TAG} -->\n")
 OPENCV_JSON = CameraFormat("opencv-json", "OpenCV FileStorage JSON", ".json", _write_json)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.cameras.camera_format import CameraFormat, refuse_skew
+from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.registry import written_lens
 
@@ -50,4 +50,4 @@ def _write(camera: Camera, name: str) -> str:
     return camera_info_text(camera, name)
 
 
-ROS = CameraFormat("ros", "ROS camera_info YAML", ".yaml", _write)
+ROS = CameraFormat("ros", "ROS camera_info YAML", ".yaml", _write, ending=HASH_TAG)

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.file_tag import TAG
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _MAX_BYTES = 8 * 1024 * 1024
@@ -21,6 +22,7 @@ def pack(members: Mapping[str, bytes]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, data in members.items():
             archive.writestr(zipfile.ZipInfo(name, _EPOCH), data)
+        archive.comment = TAG.encode()
     return buffer.getvalue()
 
 

@@ -1,5 +1,7 @@
 """Build ROS messages from values, with rosbags, and write them as bags: for simulated recordings, exports and tests."""
 
+import errno
+import sqlite3
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,18 +167,24 @@ def write_ros2(path: Path, messages: Iterable[RecordedMessage], *, container: Ro
 
     Raises:
         RecordingError: the folder exists.
+        OSError: it cannot be written.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     _refuse_existing(path)
     build = MessageBuilder(2)
     writer = Writer(path, version=9, storage_plugin=StoragePlugin[container.upper()])
-    with writer:
-        _write_all(
-            messages,
-            lambda topic, kind: writer.add_connection(topic, kind, typestore=build.typestore),
-            lambda connection, message: writer.write(connection, int(message.receive_time), build.cdr(message.body)),
-        )
+    try:
+        with writer:
+            _write_all(
+                messages,
+                lambda topic, kind: writer.add_connection(topic, kind, typestore=build.typestore),
+                lambda connection, message: writer.write(
+                    connection, int(message.receive_time), build.cdr(message.body)
+                ),
+            )
+    except sqlite3.OperationalError as error:
+        raise OSError(errno.EIO, str(error)) from error
     return path / f"{path.name}.{'mcap' if container == 'mcap' else 'db3'}"
 
 

@@ -66,7 +66,7 @@ def test_an_unsupported_suffix_or_a_missing_library_is_an_error_and_leaves_no_fi
     with open_recording(path, require=("image",)) as recording:
         with pytest.raises(InputError, match=r"unsupported video format; use \.mp4, \.mov, \.mkv"):
             write_video(recording, tmp_path / "camera.avi")
-        with pytest.raises(InputError, match=r"absent/camera\.mp4: cannot be written: No such file or directory"):
+        with pytest.raises(FileNotFoundError):
             write_video(recording, tmp_path / "absent" / "camera.mp4")
         monkeypatch.setattr(video_writing, "find_spec", lambda name: None)
         with pytest.raises(InputError, match=r"needs PyAV, which is not installed: pip install 'cocalib\[video\]'"):

@@ -1,20 +1,23 @@
 """What is written for Rerun is read back with Rerun's own reader and compared with the recording and its calibration."""
 
 import dataclasses
-import shutil
+import errno
+import io
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from calib_core.errors import InputError
+from calib_core.file_tag import OTHER_KIND, TAG, kind_of
+from cocalib.platform import files
 from cocalib.recorded_view import RecordedView
-from cocalib.rerun import write_view
+from cocalib.rerun import write_view, writing
 from cocalib.rerun.unmoving import summary_text
-from cocalib.rerun.writing import _require_complete
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
 pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
@@ -153,8 +156,8 @@ def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_picture(read, vie
 
 
 def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view, tmp_path):
-    path = tmp_path / "view.rrd"
-    path.write_bytes(b"old")
+    path, old = tmp_path / "view.rrd", f"old, {TAG}"
+    path.write_text(old)
 
     def stop(_done: int, _total: int) -> None:
         raise KeyboardInterrupt
@@ -162,23 +165,35 @@ def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view, tmp_path)
     with pytest.raises(KeyboardInterrupt):
         write_view(view, path, progress=stop)
     assert [file.name for file in tmp_path.iterdir()] == ["view.rrd"]
-    assert path.read_bytes() == b"old"
+    assert path.read_text() == old
 
 
-def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(view, tmp_path, monkeypatch):
-    free = iter([10**12, 10**12, 10**12, 5_000_000])
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=next(free)))
-    with pytest.raises(InputError, match="disk is nearly full"):
+@pytest.mark.parametrize("room_bytes", [0, 30_000])
+def test_a_disk_that_fills_up_ends_it_and_leaves_nothing(view, tmp_path, monkeypatch, room_bytes):
+    class Full(io.BufferedWriter):
+        def write(self, data):
+            if self.tell() + len(data) > room_bytes:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return super().write(data)
+
+    @contextmanager
+    def small(path):
+        with files.whole_path(path) as part, Full(io.FileIO(part, "w")) as file:
+            yield file
+
+    monkeypatch.setattr(writing, "writing_whole", small)
+    with pytest.raises(InputError):
         write_view(view, tmp_path / "view.rrd")
     assert list(tmp_path.iterdir()) == []
+    assert [one.name for one in threading.enumerate() if "_copy" in one.name] == []
 
 
-def test_a_file_without_its_end_and_a_missing_folder_are_refused(view, tmp_path):
+def test_a_written_file_is_known_as_ours_and_is_whole(view, tmp_path):
+    from rerun.chunk import RrdReader
+
     path = tmp_path / "view.rrd"
     write_view(view, path)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="could not be written completely"):
-        _require_complete(path, path)
-    with pytest.raises(InputError, match="absent does not exist"):
+    assert len(RrdReader(path).recordings()) == 1
+    assert kind_of(path.read_bytes()[:1000]) == OTHER_KIND
+    with pytest.raises(InputError):
         write_view(view, tmp_path / "absent" / "view.rrd")
