@@ -98,15 +98,15 @@ function openOn() {
 /** What the line says for a moment. */
 let said = { text: "", until: 0 };
 
-/** Say something in the line on the frame for a while. @param {string} text @param {number} [ms] */
+/** Say sentences in the line on the frame for a while. @param {string} text @param {number} [ms] */
 export function say(text, ms = 5000) {
   said = { text, until: performance.now() + ms };
   emit("proposals");
   if (text) setTimeout(() => emit("proposals"), ms + 20);
 }
 
-/** What is being said now, as a sentence; "" if nothing. */
-export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}.` : "");
+/** What is being said now, in sentences; "" if nothing. */
+export const saidWords = () => (performance.now() < said.until ? said.text : "");
 
 /** While proposals are still being found. */
 export const isSearching = () => Boolean(state.proposals?.on && state.proposals.progress.stage === "looking");
@@ -221,7 +221,7 @@ export const takesEnter = () => takesKeys() || heldBack() !== "" || leadsOn() ||
 function seenOffer() {
   const offer = shownOffer();
   if (!isComing() && (!offer || !justMoved())) return offer;
-  say("Just shown: press again", 1000);
+  say("Just shown: press again.", 1000);
   return null;
 }
 
@@ -239,7 +239,7 @@ export async function acceptProposal() {
   if (!isInView(offer)) {
     show(offer.row);
     moved = performance.now();
-    return say("Back at the proposal: look, then press Enter again");
+    return say("Back at the proposal: look, then press Enter again.");
   }
   const { pixel_px, sigma_px } = offer.place;
   const { placement, image_time } = offer.row;

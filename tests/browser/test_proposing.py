@@ -347,6 +347,7 @@ def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
         page = open_page(running.url)
         page.until("__cocalib.state.proposals?.progress.problem")
         page.press("n")
-        page.until("document.getElementById('guide').textContent.includes('No proposals: ')")
+        page.until("document.getElementById('guide').textContent.includes('No proposals. ')")
         page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
         assert "intrinsics" in page.text("#guide")
+        assert ".." not in page.text("#guide")
