@@ -13,7 +13,7 @@ from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.intrinsics import Board
-from calib_core.synthetic.rendering.still import Window
+from calib_core.synthetic.rig import Window
 
 MARGIN_SQUARES = 0.6
 """Width of the white margin around the squares."""

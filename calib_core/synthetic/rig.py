@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Vector3
+from calib_core.arrays import Matrix33, Points2, Vector3
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.lens_models.registry import LENS_MODELS
@@ -126,3 +126,27 @@ def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions 
     rotation = rotation_exp(error_rad) @ rotation_exp(np.deg2rad(options.camera_angles_deg)) @ nominal_rotation()
     centre = np.array(options.camera_offset_m) + _OFFSET_SIGMA_M * rng.standard_normal(3)
     return Rig(camera, RigidTransform(rotation, -rotation @ centre), radar_stand(options))
+
+
+_FAR_PX = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A rectangle of the picture, given by its row and column slices."""
+
+    rows: slice
+    columns: slice
+
+    @classmethod
+    def around(cls, pixels_px: Points2, camera: Camera, margin_px: float = 2.0) -> "Window | None":
+        """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
+        if not np.all(np.isfinite(pixels_px)):
+            return None
+        bounded = np.clip(pixels_px, -_FAR_PX, _FAR_PX)  # next to the plane of the lens, pixels are beyond any integer
+        low = np.floor(bounded.min(axis=0) - margin_px).astype(int)
+        high = np.ceil(bounded.max(axis=0) + margin_px + 1).astype(int)
+        low, high = np.maximum(low, 0), np.minimum(high, [camera.width_px, camera.height_px])
+        if np.any(high <= low):
+            return None
+        return cls(slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0])))

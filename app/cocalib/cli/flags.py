@@ -41,7 +41,7 @@ class OutputFlags:
     """What an output may replace."""
 
     force: MoreSwitch = False
-    """Let an output replace a file that cocalib did not write; never one that is read."""
+    """Let an output replace a foreign file; never one that is read."""
 
 
 Output: TypeAlias = Annotated[OutputFlags, tyro.conf.arg(name=""), MORE]

@@ -1,7 +1,7 @@
 """What a command writes: one rule for every output, and each file is whole or not there at all.
 
 - Never a file that is read, by whatever name: `keep` says which those are.
-- A file that cocalib did not write, or of another kind, is replaced only with --force, and not below a folder that is read.
+- A foreign file, or one of another kind, is replaced only with --force, and not below a folder that is read.
 - A link is followed if what it leads to passes the same rule; one that leads nowhere is refused.
 - A pipe or a device is written to, never replaced; a disk is refused.
 """

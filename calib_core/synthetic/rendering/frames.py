@@ -18,9 +18,9 @@ from calib_core.synthetic.rendering.reflector import (
     shadow_limbs,
     stand_limbs,
 )
-from calib_core.synthetic.rendering.still import LENS_BLUR_PX, Still, Window, trace_still
+from calib_core.synthetic.rendering.still import LENS_BLUR_PX, Still, trace_still
 from calib_core.synthetic.rendering.surfaces import display, lit
-from calib_core.synthetic.rig import Rig
+from calib_core.synthetic.rig import Rig, Window
 from calib_core.synthetic.scene.person import Capsule, PersonState, Surface, capsules
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 from calib_core.synthetic.scene.story import Moment

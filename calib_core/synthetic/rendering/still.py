@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points2, Vector3
-from calib_core.camera import Camera
+from calib_core.arrays import Vector3
 from calib_core.synthetic.rendering.surfaces import (
     GROUNDS,
     Patch,
@@ -23,7 +22,6 @@ from calib_core.synthetic.rendering.surfaces import (
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.scenes import Backdrop, Scene
 
-_FAR_PX = 1e6
 _GRID_PX = 4
 _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012
@@ -49,27 +47,6 @@ class Still:
     ground: np.ndarray
     rays: np.ndarray
     eye_m: Vector3
-
-
-@dataclass(frozen=True, slots=True)
-class Window:
-    """A rectangle of the picture, given by its row and column slices."""
-
-    rows: slice
-    columns: slice
-
-    @classmethod
-    def around(cls, pixels_px: Points2, camera: Camera, margin_px: float = 2.0) -> "Window | None":
-        """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
-        if not np.all(np.isfinite(pixels_px)):
-            return None
-        bounded = np.clip(pixels_px, -_FAR_PX, _FAR_PX)  # next to the plane of the lens, pixels are beyond any integer
-        low = np.floor(bounded.min(axis=0) - margin_px).astype(int)
-        high = np.ceil(bounded.max(axis=0) + margin_px + 1).astype(int)
-        low, high = np.maximum(low, 0), np.minimum(high, [camera.width_px, camera.height_px])
-        if np.any(high <= low):
-            return None
-        return cls(slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0])))
 
 
 def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
