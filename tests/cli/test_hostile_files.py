@@ -140,9 +140,9 @@ def test_a_standard_deviation_beyond_any_measurement_is_refused(cocalib, pairs_f
 
 @pytest.mark.parametrize("sigma", ["0", "5e-324", "1e-200", "1e-20"])
 def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(cocalib, pairs_file, sigma):
-    priors = ("radar.range-scale-sigma", "radar.range-bias-sigma-m", "radar.height-sigma-m", "lens.distortion-sigma",
-              "lens.focal-length-sigma", "radar.azimuth-scale-sigma", "reflector.offset-sigma-m")  # fmt: skip
-    typed = [word for prior in priors for word in (f"--{prior}", sigma)]
+    priors = ("radar.range_scale_sigma", "radar.range_bias_sigma_m", "radar.height_sigma_m", "lens.distortion_sigma",
+              "lens.focal_length_sigma", "radar.azimuth_scale_sigma", "reflector.offset_sigma_m")  # fmt: skip
+    typed = [word for prior in priors for word in ("--set", f"{prior}={sigma}")]
     assert cocalib("solve", "--pairs", pairs_file, *typed).code == 0
 
 
