@@ -54,7 +54,7 @@ def test_contrast_of_known_colours():
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_text_stands_out_from_everything_that_it_is_on(theme, project_root):
-    colours = themes((project_root / "static" / "shell" / "look.css").read_text())[theme]
+    colours = themes((project_root / "static" / "base" / "look.css").read_text())[theme]
     surface = parsed(colours["surface"])[0]
     below = {name: parsed(colours[name])[0] for name in SURFACES}
     below |= {name: over(colours[name], surface) for name in SOFT}

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
 from calib_core.interchange import compare, imported, read_calibration
-from calib_core.measurements import TimeNs
+from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.making import subject_of
 from cocalib.report.residual_rows import ResidualRows
@@ -118,7 +118,7 @@ def fullest_subject(project_root: Path) -> ReportSubject:
         "the residuals of the pairs at the left edge are twice as long as the noise of clicks and radar explains, " * 2
     )
     warnings = tuple(DataWarning.reported(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
-    unpaired = tuple(replace(calibration.unpaired[0], id=f"u{k}", reason=long) for k in range(20))
+    unpaired = tuple(Unpaired.reported(f"u{k}", "no-scan", long, "record longer") for k in range(20))
     full = replace(calibration, camera=camera, pairs=pairs, warnings=warnings, unpaired=unpaired)
     subject = subject_for(project_root, full)
     files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))

