@@ -6,7 +6,6 @@ import subprocess
 import sys
 from dataclasses import fields, replace
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
