@@ -132,7 +132,7 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     stack = stack_views(views, board_m, search.size_px)
     states = _starts(stack, model)
     if not states:
-        return Unsolvable("no-lens")
+        return Unsolvable("no-lens", {"views": len(views), "why": "no focal length explains them", "model": model})
     judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
     reasons = zip(views, judged.reasons, strict=True)
     left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]

@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from calib_core.words.remark import Remark, Row, by_code, remark
+from calib_core.measurements import Unsolvable
+from calib_core.words.remark import Remark, Row, by_code, by_row, remark
+from calib_core.words.text import sentence
 
 if TYPE_CHECKING:
     from calib_core.intrinsics import Board, LeftOutPicture, ResidualField, SplitDifference
@@ -155,9 +157,7 @@ def mixed_sizes(*, counts: Sequence[tuple[tuple[int, int], int]]) -> Remark:
     )
 
 
-def no_lens(*, views: int = 0, why: str = "", model: str = "auto") -> Remark:
-    if not views:
-        return remark("no focal length of any lens model explains most of the views", _FILM)
+def no_lens(*, views: int, why: str, model: str) -> Remark:
     return remark(
         f"no lens model fits {views} views: {why}",
         _FILM if model == "auto" else "choose another lens model, or let it be chosen (auto)",
@@ -198,8 +198,10 @@ OUTCOMES: Mapping[str, Row] = {
 }
 
 
-def halves_text(halves: "SplitDifference") -> str:
-    """Say what calibrating halves of the views separately shows."""
+def halves_text(halves: "SplitDifference | Unsolvable") -> str:
+    """Say what calibrating halves of the views separately shows, or why there are none."""
+    if isinstance(halves, Unsolvable):
+        return str(sentence(by_row(halves, OUTCOMES).message))
     how = f"Calibrated separately from {halves.split}, two lenses differ by {halves.ratio:.1f} times what the stated uncertainty"
     if halves.agrees:
         return f"{how} lets expect: no error of the lens model shows."

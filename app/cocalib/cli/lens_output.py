@@ -17,8 +17,7 @@ from calib_core.intrinsics import (
     split_difference,
 )
 from calib_core.intrinsics.coverage import Coverage
-from calib_core.measurements import Unsolvable
-from calib_core.words import in_sentences, outcome_told
+from calib_core.words import in_sentences
 from calib_core.words.intrinsics import halves_text, residuals_text
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.platform.files import write_whole
@@ -91,9 +90,7 @@ def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
     corners = sigmas[[0, 0, -1, -1], [0, -1, 0, -1]].max()
     yield f"projection     known to {plain(middle, 2)} px in the middle of the picture, {plain(corners, 2)} px in a corner"
     yield f"               {MODEL_ERRORS_UNSEEN}"
-    halves = split_difference(lens)
-    said = sentence(str(outcome_told(halves).message)) if isinstance(halves, Unsolvable) else halves_text(halves)
-    yield f"cross-check    {said}"
+    yield f"cross-check    {halves_text(split_difference(lens))}"
     yield f"residuals      {residuals_text(residual_field(lens))}"
 
 

@@ -16,7 +16,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
-from calib_core.words import outcome_told, told
+from calib_core.words import told
 from calib_core.words.intrinsics import halves_text, residuals_text
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
@@ -211,7 +211,7 @@ def _uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
     shown: list[Child] = [captioned("Projection uncertainty", drawn, said)]
     halves = split_difference(lens)
     if isinstance(halves, Unsolvable):
-        shown.append(tag("p", f"Not cross-checked: {outcome_told(halves).message}.", class_="note"))
+        shown.append(tag("p", f"Not cross-checked: {halves_text(halves)}", class_="note"))
     else:
         cells = _cells(halves.apart_px, lens.camera)
         drawn = _over_picture(halves_text(halves), lens.camera, *cells, _picture_frame(lens.camera))

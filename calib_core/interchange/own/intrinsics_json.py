@@ -28,8 +28,7 @@ from calib_core.intrinsics import (
     split_difference,
 )
 from calib_core.intrinsics.coverage import Coverage
-from calib_core.measurements import Unsolvable
-from calib_core.words import outcome_told, warning_text
+from calib_core.words import warning_text
 from calib_core.words.intrinsics import halves_text, residuals_text
 
 
@@ -50,7 +49,6 @@ def write_intrinsics(
         field_of_view_deg: along the middle row and the middle column [deg].
         coverage: of the used views.
     """
-    halves = split_difference(lens)
     document = IntrinsicsDocument(
         schema=INTRINSICS_SCHEMA,
         camera=camera_document(lens.camera),
@@ -68,7 +66,7 @@ def write_intrinsics(
         projection_uncertainty=_uncertainty(lens),
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),
-        halves_apart=str(outcome_told(halves).message) if isinstance(halves, Unsolvable) else halves_text(halves),
+        halves_apart=halves_text(split_difference(lens)),
         warnings=[warning_text(warning) for warning in lens.warnings],
         board_shape_m=[(x, y, z) for x, y, z in lens.board_shape_m.tolist()],
     )

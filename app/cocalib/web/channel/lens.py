@@ -24,6 +24,7 @@ from calib_core.intrinsics import (
     residual_field,
 )
 from calib_core.recordings import Recording
+from calib_core.words.intrinsics import residuals_text
 from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures, field_of_view_text
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
@@ -245,7 +246,7 @@ def lens_result(number: int, lens: CalibratedLens, about: str) -> LensResult:
         trials=tuple(_trial(one, lens.camera.model) for one in lens.trials),
         warnings=tuple(map(warning_row, lens.warnings)),
         residuals=_residuals(lens.views),
-        pattern=_pattern(lens),
+        pattern=residuals_text(residual_field(lens)) if lens.views else "",
         uncertainty=_uncertainty(lens),
         unseen=MODEL_ERRORS_UNSEEN,
     )
@@ -279,18 +280,6 @@ def _residuals(views: tuple[LensView, ...]) -> tuple[tuple[float, float, float, 
     )
     every = max(1, -(-len(found) // _MOST_RESIDUALS))
     return tuple((round(u, 1), round(v, 1), round(du, 3), round(dv, 3)) for u, v, du, dv in found[::every].tolist())
-
-
-def _pattern(lens: CalibratedLens) -> str:
-    """Say whether the residuals have a pattern that the views share."""
-    if not lens.views:
-        return ""
-    field = residual_field(lens)
-    if field.systematic:
-        return (
-            f"All views share a pattern of {plain(field.systematic_px, 2)} px: the lens model leaves that unexplained."
-        )
-    return "The views share no pattern: the lens model explains what they show."
 
 
 def _uncertainty(lens: CalibratedLens) -> PictureGrid | None:

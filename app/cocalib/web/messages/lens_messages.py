@@ -144,7 +144,7 @@ class LensResult:
         trials: models that were tried.
         warnings: what to decide on.
         residuals: found corner (u, v) and its residual (du, dv), of a sample of the corners [px].
-        pattern: whether the views share a pattern of residuals, in a sentence.
+        pattern: whether the residuals are more than noise, in a sentence.
         uncertainty: standard deviation of the projection over the picture [px]; None if it is not known.
         unseen: what that cannot see, in sentences.
     """

@@ -225,7 +225,6 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("mixed-sizes", {"counts": [((640, 480), 9), ((320, 240), 8)]}),
     Unsolvable("no-board", {"board": _BOARD, "searched": 20, "views": 0}),
     Unsolvable("no-board", {"board": Board("charuco", 8, 11, 0.03, 0.02), "searched": 20, "views": 1}),
-    Unsolvable("no-lens"),
     Unsolvable("no-lens", {"views": 9, "why": "pinhole: no focal length explains the views", "model": "auto"}),
     Unsolvable("no-lens", {"views": 9, "why": "pinhole: no focal length explains the views", "model": "pinhole"}),
     Unsolvable("no-pictures"),
