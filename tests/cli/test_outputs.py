@@ -310,6 +310,13 @@ def test_of_files_that_belong_together_none_is_written_if_one_may_not_be(here, c
     assert cocalib("export", "calibration.json", "--to", "all", "--out", "all").code == 0
 
 
+def test_of_files_that_belong_together_none_is_written_if_one_cannot_be(here, cocalib):
+    before = states(here)
+    with _full_after(5_000):
+        assert cocalib("export", "calibration.json", "--to", "kitti", "--out", "calib.txt").code == 2
+    assert states(here) == before
+
+
 def test_one_name_is_not_for_two_outputs(here, cocalib):
     before = states(here)
     assert cocalib("evaluate", "calibration.json", "--report", "o.html", "--report", "./o.html").code == 2

@@ -162,10 +162,11 @@ def _kept_files(paths: Sequence[Path]) -> "tuple[TreeFile, ...]":
     Raises:
         InputError: one cannot be read, or a folder contains none.
     """
-    from calib_core.interchange import tree_files
+    from calib_core.interchange import files_beside, tree_files
 
     files = tree_files(paths)
-    keep(Path(file.source) for file in files)
+    for path in (Path(file.source) for file in files):
+        keep((path, *(path.with_name(name) for name in files_beside(path))))
     return files
 
 

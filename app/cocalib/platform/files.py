@@ -13,7 +13,7 @@ import shutil
 import stat
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
@@ -139,17 +139,19 @@ def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> Non
             replace_file(target, data)
 
 
-def write_all(files: Mapping[Path, str | bytes]) -> None:
-    """Write files that belong together; none is written if one of them may not be.
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all, or none if one of them may not or cannot be written.
 
     Raises:
         InputError: one may not or cannot be written.
     """
-    for path, content in files.items():
-        with _explained(path):
-            writable(path, kind_of(content.encode() if isinstance(content, str) else content))
-    for path, content in files.items():
-        write_whole(path, content)
+    if len(files) == 1:  # which may be a pipe
+        ((path, data),) = files.items()
+        write_whole(path, data)
+        return
+    with ExitStack() as parts:
+        for path, data in files.items():
+            parts.enter_context(whole_path(path, kind_of(data))).write_bytes(data)
 
 
 @contextmanager
@@ -164,28 +166,32 @@ def writing_whole(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def whole_path(path: Path) -> Iterator[Path]:
+def whole_path(path: Path, kind: str = OTHER_KIND) -> Iterator[Path]:
     """Yield a name to write a file to by other means, with its suffix; it takes its own name as in `writing_whole`.
+
+    Args:
+        path: of the file.
+        kind: of what is to be written.
 
     Raises:
         InputError: it may not or cannot be written; the old file stays.
     """
     with _explained(path):
-        target = _regular(path)
+        target = _regular(path, kind)
         temporary = target.with_name(f".{target.stem}.{secrets.token_hex(6)}.part{target.suffix}")
         try:
             temporary.touch(exist_ok=False)
             yield temporary
             with temporary.open("rb") as file:
                 os.fsync(file.fileno())
-            temporary.replace(_regular(path))
+            temporary.replace(_regular(path, kind))
         finally:
             temporary.unlink(missing_ok=True)
         _sync_folder(target.parent)
 
 
-def _regular(path: Path) -> Path:
-    target = writable(path)
+def _regular(path: Path, kind: str) -> Path:
+    target = writable(path, kind)
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: is not a regular file; name a file")
     return target

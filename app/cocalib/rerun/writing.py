@@ -64,13 +64,13 @@ def _stream_to(file: BinaryIO, view: RecordedView, faults: list[OSError]) -> "It
 
     from cocalib.rerun.moving import layout
 
+    stream = rr.RecordingStream(_APPLICATION, send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
     end, start = os.pipe()
     copying = threading.Thread(target=_copy, args=(end, file, faults))
     copying.start()
-    stream = rr.RecordingStream(_APPLICATION, send_properties=False)
     try:
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
         try:
             stream.save(f"/dev/fd/{start}", layout(view))
         finally:

@@ -11,6 +11,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text
+from calib_core.interchange.cameras.camera_format import HASH_TAG
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     Board,
@@ -133,7 +134,7 @@ class LensDesk:
         camera = (lens.camera if lens else None) if calibrated else self._workspace.camera
         if camera is None:
             raise InputError("there are no intrinsics to save yet; calibrate the lens first")
-        return camera_info_text(camera, "camera")
+        return camera_info_text(camera, "camera") + HASH_TAG
 
     def _changed(self) -> None:
         """Take note of progress, in the thread of the calibration; the pages are told shortly afterwards."""
