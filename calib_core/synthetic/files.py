@@ -57,8 +57,8 @@ def write_recording(
         recording: what to write.
         folder: created if it does not exist; existing files are not overwritten.
         containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each: a folder with
-            metadata.yaml, whose data file can also be opened alone. "csv" and "jsonl" write a folder without ROS: pictures
-            named by date, the radar as a table or as one JSON object per scan, and camera.yaml.
+            metadata.yaml, whose data file can also be opened alone. "csv" writes a folder without ROS: pictures named by date,
+            the radar as a table, and camera.yaml.
         progress: called after each frame with the number written and the total over all containers.
 
     Raises:
@@ -66,7 +66,7 @@ def write_recording(
         InputError: ROS has no name for the camera's lens model, or a container has no room for a second camera.
     """
     camera, other = recording.camera, recording.other_camera
-    if other is not None and not set(containers).isdisjoint({"csv", "jsonl"}):
+    if other is not None and "csv" in containers:
         raise InputError("a folder of pictures holds one camera; write a recording of two cameras as ros1, mcap or db3")
     written_lens(camera.lens, camera.distortion, "camera_info")  # refused before anything is written
     folder.mkdir(parents=True, exist_ok=True)
@@ -74,8 +74,8 @@ def write_recording(
     frame_count = len(recording.stage.frame_times.header_ns)
     for number, container in enumerate(containers):
         frames = _counted(recording, progress, before=number * frame_count, total=len(containers) * frame_count)
-        if container in ("csv", "jsonl"):
-            written.extend(write_plain_files(recording, folder / f"recording_{container}", container, frames))
+        if container == "csv":
+            written.extend(write_plain_files(recording, folder / "recording_csv", frames))
         elif container == "ros1":
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
             written.append(write_ros1_bag(folder / "camera.bag", _pictures(recording, frames)))
@@ -116,15 +116,13 @@ _HEADER = "Timestamp;Track;Range [m];Azimuth (deg);Elevation (deg);Doppler [m/s]
 
 
 def write_plain_files(
-    recording: SimulatedRecording, folder: Path, radar: Literal["csv", "jsonl"], frames: Iterable[SimulatedFrame]
+    recording: SimulatedRecording, folder: Path, frames: Iterable[SimulatedFrame]
 ) -> tuple[Path, ...]:
     """Write a folder of pictures, the radar's returns and the intrinsics; return their paths.
 
     Args:
         recording: what to write.
-        folder: created.
-        radar: "csv" writes a table with a row per return, in degrees, with columns that nobody needs; "jsonl" an object per
-            scan, with a list of returns in Cartesian positions.
+        folder: created. Its table has a row per return, in degrees, with columns that nobody needs.
         frames: of the recording.
     """
     pictures = folder / "camera"
@@ -137,10 +135,9 @@ def write_plain_files(
         written.append(folder / "camera.yaml")
         written[1].write_text(camera_info_text(recording.stage.published_camera, "camera"), encoding="utf-8")
     for antenna in recording.stage.antennas:
-        path = folder / f"radar{'_' if antenna.name else ''}{antenna.name}.{radar}"
-        lines = _table(recording, antenna) if radar == "csv" else _objects(recording, antenna)
+        path = folder / f"radar{'_' if antenna.name else ''}{antenna.name}.csv"
         with path.open("w", encoding="utf-8", newline="") as file:
-            file.writelines(lines)
+            file.writelines(_table(recording, antenna))
         written.append(path)
     return tuple(written)
 
@@ -158,15 +155,6 @@ def _table(recording: SimulatedRecording, antenna: Antenna) -> Iterator[str]:
         columns = (polar[:, 0], *np.rad2deg(polar[:, 1:]).T, scan.doppler_mps, scan.snr_db)
         for number, row in enumerate(np.column_stack(columns).tolist()):
             yield ";".join((when, str(number), *(f"{value:.6f}" for value in row), "1")) + "\n"
-
-
-def _objects(recording: SimulatedRecording, antenna: Antenna) -> Iterator[str]:
-    """Yield a line of JSON per scan."""
-    names = ("x_m", "y_m", "z_m", "doppler_mps", "snr_db")
-    for scan in recording.scans_of(antenna):
-        rows = np.column_stack([scan.points_radar_m, scan.doppler_mps, scan.snr_db]).round(6).tolist()
-        targets = [dict(zip(names, row, strict=True)) for row in rows]
-        yield json.dumps({"time_ns": int(scan.time), "targets": targets}) + "\n"
 
 
 _PIXEL_DECIMALS = 6

@@ -90,7 +90,7 @@ class RadarDefects:
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"]
 Clutter = Literal["none", "scene", "heavy"]
-Container = Literal["ros1", "mcap", "db3", "csv", "jsonl"]
+Container = Literal["ros1", "mcap", "db3", "csv"]
 
 
 @dataclass(frozen=True, slots=True)

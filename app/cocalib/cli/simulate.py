@@ -23,7 +23,7 @@ class Simulate:
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER"), OUTPUT_FOLDER]
     """Output folder; created if missing, must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
-    """Files to write: ros1 (radar.bag and camera.bag), mcap, db3; without ROS: dated pictures, and the radar as csv or jsonl."""
+    """Files to write: ros1 (radar.bag and camera.bag), mcap, db3; without ROS: dated pictures, and the radar as csv."""
     preset: PresetName = "default"
     """Set of options that makes the recording unkind in one way or in many; --options and --set change single ones."""
     options: File = None

@@ -37,7 +37,7 @@ def _boxes(*places: tuple[ActorLabel, float, float, float]) -> dict[str, Box]:
     return {box.track: box for box in true_boxes(_standing(simulate(WALK), *places)).frames[3].boxes}
 
 
-@pytest.mark.parametrize(("radar", "container"), [("awr1843", "ros1"), ("imaging", "ros1"), ("awr1843", "jsonl")])
+@pytest.mark.parametrize(("radar", "container"), [("awr1843", "ros1"), ("imaging", "ros1"), ("awr1843", "mcap")])
 def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(radar, container, tmp_path):
     recording = simulate(replace(WALK, radar=radar, width_px=64, height_px=64, camera_rate_hz=1.0))
     write_recording(recording, tmp_path, (container,))

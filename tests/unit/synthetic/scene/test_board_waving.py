@@ -94,7 +94,7 @@ def test_nothing_in_the_recording_tells_of_the_lens(folder):
 def test_a_folder_without_ros_has_no_camera_file_either(recording, tmp_path):
     from calib_core.synthetic.files import write_plain_files
 
-    write_plain_files(recording, tmp_path / "plain", "csv", [])
+    write_plain_files(recording, tmp_path / "plain", [])
     assert not (tmp_path / "plain" / "camera.yaml").exists()
 
 
