@@ -1,11 +1,9 @@
 """Files that are read as input: only regular files, never more than a limit, and names that every encoder takes."""
 
-import json
 import os
 import re
 import select
 import stat
-from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -120,48 +118,6 @@ def read_text(
         return file_text(data)
     except UnicodeDecodeError:
         raise InputError(f"{path}: {no_text(data, is_what)}") from None
-
-
-_FIRST_ROW, _NEXT_ROW, _NO_ROW = (re.compile(rf"\s*{mark}\s*") for mark in (r"\[\s*(?={)", r",\s*(?={)", r"(\[\s*)?\]"))
-_LONGEST_ROW, _MOST_PARTS = 1 << 20, 100
-
-
-def json_rows(path: Path, *, source: str) -> Iterator[dict[str, Any]]:
-    """Yield the objects of a JSON list one by one, of a file of any size.
-
-    Args:
-        path: of the file.
-        source: its name in error messages.
-
-    Raises:
-        InputError: it cannot be read, is no list of objects, or one of them is longer than a megabyte.
-    """
-    decoder, text, count = json.JSONDecoder(), "", 0
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            while len(text) <= 2 * _LONGEST_ROW and (more := file.read(_LONGEST_ROW)):
-                text, at = text + more, 0
-                while start := (_NEXT_ROW if count else _FIRST_ROW).match(text, at):
-                    try:
-                        row, end = decoder.raw_decode(text, start.end())
-                    except json.JSONDecodeError:  # as it is where the text read so far ends
-                        break
-                    if text.count("[", at, end) + text.count("{", at, end) > _MOST_PARTS:
-                        raise RecursionError
-                    at, count = end, count + 1
-                    yield row
-                text = text[at:]
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror or error}; check its permissions") from None
-    except (ValueError, RecursionError):  # not UTF-8, a number of thousands of digits, nested
-        raise InputError(
-            f"{source}: row {count + 1:,} is not text in UTF-8, or nested too deeply; copy it again"
-        ) from None
-    if not (_NO_ROW.fullmatch(text) and bool(count) != ("[" in text)):
-        raise InputError(
-            f"{source}: expected a list of rows in braces, and found something else after {count:,} of them; "
-            "is it the right file, and was it copied completely?"
-        )
 
 
 def no_text(data: bytes, wanted: str) -> str:

@@ -14,7 +14,6 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -29,8 +28,9 @@ from calib_core.boxes.formats.own import OWN
 from calib_core.boxes.formats.yolo import YOLO
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, name_text, other_kind, read_input
-from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.interchange.syntax.xml_places import parse_xml
 from calib_core.measurements import Box, Boxes
+from calib_core.parsing import json_value
 from calib_core.recordings.box_topics import frames_of_stamps, joined_frames
 from calib_core.recordings.plain_files.file_stamps import times_in_names
 
@@ -97,7 +97,7 @@ def _boxes_in(file: BoxFile, image_times: TimesNs, image_names: Sequence[str]) -
 
 
 _MAX_BYTES = 256 * 1024 * 1024
-_MAX_XML_BYTES = 64 * 1024 * 1024
+_MOST_XML_MARKS = 500_000
 _MOST_MEMBERS = 200_000
 _IS_WHAT = "a file of boxes"
 _SUFFIXES = (".txt", ".yaml", ".yml", ".json", ".xml", ".names")
@@ -147,7 +147,9 @@ def _box_file(source: str, members: Mapping[str, bytes], image_size_px: tuple[in
     if start in ("{", "["):
         return BoxFile(source, value=json_value(text, source=source), image_size_px=image_size_px)
     if start == "<":
-        return BoxFile(source, root=_xml(text, source), image_size_px=image_size_px)
+        return BoxFile(
+            source, root=parse_xml(text, source=source, most_marks=_MOST_XML_MARKS), image_size_px=image_size_px
+        )
     texts = {name_text(name): _text(data, f"{source}/{name_text(name)}") for name, data in members.items()}
     return BoxFile(source, members=texts, image_size_px=image_size_px)
 
@@ -199,18 +201,6 @@ def _text(data: bytes, source: str) -> str:
         return file_text(data)
     except UnicodeDecodeError as error:
         raise InputError(f"{source}: not text (byte {error.start} is not UTF-8); give {_IS_WHAT}") from None
-
-
-def _xml(text: str, source: str) -> ElementTree.Element:
-    """Parse XML that has no document type, so no entity in it expands."""
-    if len(text) > _MAX_XML_BYTES or "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(
-            f"{source}: larger than {_MAX_XML_BYTES >> 20} MB, or declares a document type; give plain XML"
-        )
-    try:
-        return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{source}: not XML ({error}); correct it there") from None
 
 
 _LEAST_INSIDE = 0.5

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import msgspec
 
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import file_text, read_input
+from calib_core.parsing import toml_table
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.results import InputFile
 
@@ -70,11 +70,11 @@ def with_recording_file(
     (path,) = found
     try:
         data = read_input(path, max_bytes=_MOST_BYTES, is_what=f"a {RECORDING_FILE}")
-        stated = tomllib.loads(file_text(data))
+        stated = toml_table(file_text(data), source=str(path))
         typed = msgspec.convert(stated, RecordingOptions)
     except InputError as error:
-        raise RecordingError(str(error)) from None
-    except (UnicodeDecodeError, RecursionError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise RecordingError(f"{error}, or give --no-recording-file") from None
+    except (UnicodeDecodeError, msgspec.ValidationError) as error:
         raise RecordingError(f"{path}: {error}; correct it, or give --no-recording-file") from None
     if unknown := next((key for key in stated if key not in _KEYS), None):
         raise RecordingError(f"{path}: unknown key {unknown[:80]!r}; it may have {', '.join(_KEYS)}")

@@ -306,8 +306,8 @@ def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(coc
     [
         ("x = 1", "unknown key 'x'; it may have radar_topic"),
         ("clock = 'wall'", "recording.toml: Invalid enum value 'wall'"),
-        ("clock =", "recording.toml: Invalid value"),
-        ("map = " + "[" * 5000, "recording.toml: maximum recursion depth exceeded; correct it"),
+        ("clock =", "recording.toml: not valid TOML"),
+        ("map = " + "[" * 5000, "recording.toml: nested too deeply"),
         ("clock = '\udcff'", "recording.toml: 'utf-8' codec can't decode byte 0xff"),
         ("radar_axes = 'forward,left,up'", "unknown key 'radar_axes'"),
         ("image_topic = '/none'", "no topic /none"),

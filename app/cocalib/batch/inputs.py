@@ -14,6 +14,7 @@ from msgspec import Struct, field
 
 from calib_core.errors import CalibrationError
 from calib_core.input_files import special_kind
+from calib_core.parsing import json_form
 from calib_core.recordings.recording_file import recording_file_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.results_folder import ResultsFolder
@@ -233,8 +234,8 @@ class InputDigests:
 
     def _read(self) -> dict[str, _Kept]:
         try:
-            document = msgspec.json.decode(self._results.read(_FILE) or b"", type=_Document)
-        except (OSError, msgspec.DecodeError, CalibrationError):
+            document = json_form(self._results.read(_FILE) or b"", _Document)
+        except (OSError, CalibrationError):
             return {}
         return document.inputs if document.schema == _SCHEMA else {}
 

@@ -1,6 +1,5 @@
 """The manifest: which sessions of which vehicles are to be calibrated, from what, and how."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from calib_core.interchange import format_named
 from calib_core.interchange.calibration_file import MOST_CHARACTERS, require_label, require_name
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.parsing import toml_table
 from calib_core.recordings import RecordingOptions
 from cocalib.option_changes import options_from_tree
 
@@ -153,10 +153,7 @@ def _text(path: Path) -> str:
 
 
 def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
-    try:
-        content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from None
+    content = toml_table(text, source=str(path))
     sessions = content.setdefault("session", [])
     if isinstance(sessions, dict):
         raise InputError(f"{path}: [session] is one table; write [[session]], with two brackets, above each session")

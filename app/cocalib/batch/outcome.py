@@ -5,6 +5,8 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
+from calib_core.parsing import json_form
+
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
 """A good or usable calibration; one not to rely on; the data give none; an input cannot be read or the program failed."""
@@ -84,6 +86,6 @@ def read_outcome(text: str) -> Outcome:
     """Read outcome-1 JSON.
 
     Raises:
-        msgspec.DecodeError: it is something else.
+        InputError: it is something else.
     """
-    return msgspec.json.decode(text, type=Outcome)
+    return json_form(text, Outcome)

@@ -7,6 +7,7 @@ sessions have no result yet, and which results belong to a name that was mistype
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final, Literal
 
@@ -14,6 +15,7 @@ import msgspec
 from msgspec import Struct
 
 from calib_core.errors import CalibrationError
+from calib_core.parsing import json_form
 from cocalib.batch.job import Job
 from cocalib.batch.results_folder import ResultsFolder
 
@@ -76,7 +78,7 @@ def read_plans(folder: Path) -> Plan:
     Args:
         folder: of the results.
     """
-    read, hint = msgspec.json.Decoder(PlanDocument).decode, "run the batch of its manifest again"
+    read, hint = partial(json_form, form=PlanDocument), "run the batch of its manifest again"
     documents, unread = [], []
     for path in sorted((folder / PLANS).glob("*.json")):
         try:

@@ -15,8 +15,6 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Self, TypeVar
 
-import msgspec
-
 from calib_core.errors import InputError
 from cocalib.batch.outcome import Outcome, OutcomeFile, read_outcome
 from cocalib.session.file.guarded_folder import GuardedFolder
@@ -68,14 +66,14 @@ class ResultsFolder:
             if found.digest != digest or not found.is_final:
                 return None
             return found if all(self._sha256(digest, file.name) == file.sha256 for file in found.files) else None
-        except (OSError, ValueError, msgspec.DecodeError, RecursionError):
+        except (OSError, ValueError, InputError):
             return None
 
     def read_as(self, parse: Callable[[str], _Content], *names: str, schema: str, hint: str) -> _Content | None:
         """Return what a file states; None if there is none.
 
         Args:
-            parse: reads its text, or raises msgspec.DecodeError.
+            parse: reads its text, or raises InputError.
             names: of the folders below this one, and its own.
             schema: that it should have.
             hint: what to do about a file that is something else.
@@ -89,7 +87,7 @@ class ResultsFolder:
             return None if content is None else parse(content.decode())
         except OSError as error:
             raise InputError(f"{place}: {error.strerror or error}; check its permissions") from error
-        except (UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
+        except (UnicodeDecodeError, InputError) as error:
             raise InputError(f"{place}: is no {schema}: {error}; {hint}") from error
 
     def read(self, *names: str) -> bytes | None:

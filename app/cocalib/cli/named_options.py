@@ -3,7 +3,6 @@
 A name is its path in the dataclass of options, as in the `options` of calibration.json.
 """
 
-import tomllib
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
@@ -15,6 +14,7 @@ import tyro
 
 from calib_core.errors import InputError, OptionError
 from calib_core.input_files import read_text
+from calib_core.parsing import toml_table
 from cocalib.option_changes import unknown_option
 
 Settings: TypeAlias = Annotated[
@@ -39,12 +39,7 @@ def with_named(options: Named, settings: Sequence[str], file: Path | None = None
     """
     tree: dict[str, Any] = {}
     if file is not None:
-        try:
-            tree = tomllib.loads(read_text(file, is_what="a TOML file of options"))
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(
-                f"{file}: not TOML, such as sigma_px = 3 below [noise]: {str(error)[:1].lower()}{str(error)[1:]}"
-            ) from None
+        tree = toml_table(read_text(file, is_what="a TOML file of options"), source=str(file))
     for text in settings:
         name, sign, value = text.partition("=")
         if not sign:

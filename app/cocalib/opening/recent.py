@@ -11,7 +11,9 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from calib_core.errors import InputError
 from calib_core.input_files import name_text
+from calib_core.parsing import json_form
 from cocalib.platform.files import replace_file
 from cocalib.platform.resources import state_folder
 from cocalib.web.messages import RecentRecording
@@ -78,10 +80,10 @@ class RecentRecordings:
     def _entries(self) -> list[_Entry]:
         try:
             with self._path.open("rb") as file:
-                return msgspec.json.decode(file.read(_MOST_BYTES), type=list[_Entry])[:_MOST]
+                return json_form(file.read(_MOST_BYTES), list[_Entry])[:_MOST]
         except FileNotFoundError:
             return []
-        except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        except (OSError, InputError) as error:
             _log.warning("%s: the list of recent recordings cannot be read: %s", self._path, error)
             return []
 

@@ -99,7 +99,7 @@ class OptionsChanged(_Journalled, frozen=True):
     @classmethod
     def of(cls, options: CalibrationOptions) -> "OptionsChanged":
         """Set all options."""
-        return cls(msgspec.json.decode(msgspec.json.encode(options)))
+        return cls(msgspec.to_builtins(options))
 
 
 class Cleared(_Journalled, frozen=True):

@@ -23,9 +23,8 @@ from calib_core.boxes.formats.box_format import (
 )
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.input_files import json_rows
-from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.measurements import TimeNs
+from calib_core.parsing import json_rows, json_value
 
 ANNOTATIONS = "sample_annotation"
 _Row = Mapping[str, Any]

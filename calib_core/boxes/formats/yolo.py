@@ -14,8 +14,8 @@ from calib_core.boxes.formats.box_format import (
     score_of,
 )
 from calib_core.errors import InputError
-from calib_core.interchange.syntax.yaml_text import load_yaml_documents
 from calib_core.measurements import Box
+from calib_core.parsing import yaml_documents
 
 _LISTS = frozenset({"classes.txt", "labels.txt", "predefined_classes.txt", "train.txt", "val.txt", "test.txt"})
 _NAMES = ("classes.txt", "predefined_classes.txt", "labels.txt")
@@ -62,7 +62,7 @@ def _labels(members: Mapping[str, str], source: str) -> dict[str, str]:
     """Return the names of the classes by number, of data.yaml or of a list with one name per line; empty without either."""
     for name, text in members.items():
         if name.lower().endswith((".yaml", ".yml")):
-            for document in load_yaml_documents(text, source=f"{source}/{name}"):
+            for document in yaml_documents(text, source=f"{source}/{name}"):
                 names = document.get("names") if isinstance(document, dict) else None
                 if isinstance(names, list):
                     return {str(number): str(label) for number, label in enumerate(names)}

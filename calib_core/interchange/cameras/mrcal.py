@@ -9,11 +9,11 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, FoundCamera, OwnSyntax, refuse_skew
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.syntax.yaml_text import numbers_text
+from calib_core.parsing import python_tree
 
 _COEFFICIENTS = {"LENSMODEL_PINHOLE": 0, "LENSMODEL_OPENCV4": 4, "LENSMODEL_OPENCV5": 5, "LENSMODEL_OPENCV8": 8}
 _MODELS = {0: "pinhole", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
 _SOLVABLE = "calibrate with LENSMODEL_OPENCV8, or convert it with mrcal-convert-lensmodel"
-_MAX_BYTES = 64 * 1024 * 1024
 
 
 def _write(camera: Camera, _name: str) -> str:
@@ -63,16 +63,10 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
 
 def _dictionary(text: str, *, source: str) -> Mapping[str, Any]:
     """Parse a dictionary of literals; nothing in it is evaluated."""
-    if len(text) > _MAX_BYTES:
-        raise InputError(
-            f"{source}: {len(text) >> 20} MB are too many for a cameramodel; give the model without its inputs"
-        )
     try:
-        values = ast.literal_eval(text.strip())
-    except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
-        raise InputError(
-            f"{source}: not a valid cameramodel ({type(error).__name__}); write it again with mrcal"
-        ) from None
+        values = ast.literal_eval(python_tree(text.strip(), source=source, mode="eval"))
+    except (ValueError, TypeError, RecursionError) as error:
+        raise InputError(f"{source}: not a valid cameramodel ({error}); write it again with mrcal") from None
     if not isinstance(values, dict):
         raise InputError(f"{source}: not a valid cameramodel: a {type(values).__name__}; write it again with mrcal")
     return values

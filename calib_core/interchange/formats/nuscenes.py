@@ -20,8 +20,9 @@ from calib_core.interchange.formats.statement import (
     with_statement,
 )
 from calib_core.interchange.syntax.content import Content, decoded
-from calib_core.interchange.syntax.strict_json import json_text, json_value
+from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.interchange.syntax.zip_archives import pack
+from calib_core.parsing import json_value
 
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "

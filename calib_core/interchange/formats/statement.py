@@ -4,17 +4,18 @@ The origin is what an exported file says of the calibration that it was made fro
 it cannot hold.
 """
 
-import json
 import re
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, Evidence, FrameNames, stated_evidence
 from calib_core.interchange.format import ImportedCalibration, StatedCheckPoint
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.parsing import json_value
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration
 
@@ -110,8 +111,8 @@ def stated_frames(text: str) -> FrameNames | None:
     """Find the two frame names in a file's comment."""
     match = _FRAMES.search(text)
     try:
-        return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
-    except ValueError:
+        return FrameNames(*(json_value(name, source="") for name in match.groups())) if match else None
+    except InputError:
         return None
 
 

@@ -27,6 +27,7 @@ from calib_core.interchange.formats.statement import (
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
+from calib_core.parsing import python_tree
 
 PUBLISHER = "static_transform_publisher"
 _DRIVERS_ENDING = "_optical_frame"
@@ -270,10 +271,7 @@ def _read_python(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: there are none, or they are not plain strings.
     """
-    try:
-        tree = ast.parse(content.text)
-    except (SyntaxError, ValueError, RecursionError) as error:
-        raise InputError(f"{source}: not Python ({error}); correct it there") from None
+    tree = python_tree(content.text, source=source)
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.keyword) and node.arg == "arguments" and isinstance(node.value, ast.List):

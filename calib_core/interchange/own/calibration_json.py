@@ -60,6 +60,7 @@ from calib_core.interchange.syntax.strict_json import (
 )
 from calib_core.measurements import Candidate, Pair, ReflectorClick
 from calib_core.options import CalibrationOptions
+from calib_core.parsing import json_value
 from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
 from calib_core.results import Calibration, CheckPoint, PairResult
 from calib_core.results.calibration import CovarianceParts
@@ -460,7 +461,7 @@ def with_kept(content: dict[str, Any], kept: tuple[KeptResult, ...]) -> dict[str
         for step in result.place[:-1]:
             owner = _inside(owner, step)
         if isinstance(owner, dict):
-            key, value = result.place[-1], json.loads(result.json_text)
+            key, value = result.place[-1], json_value(result.json_text, source="")
             if key not in owner or _is_rounding(owner[key], value):
                 owner[key] = value
     return content

@@ -19,6 +19,7 @@ from calib_core.interchange.rotations import nearest_rotation
 from calib_core.json_forms import Count, Measured, Name, Pixel, Position, Positive, Share
 from calib_core.measurements import ChosenReturn, Mark, TimeNs
 from calib_core.options import CalibrationOptions
+from calib_core.parsing import json_form
 from calib_core.radar import RadarErrors
 from calib_core.results import InputFile, Metrics, UnconfirmedClicks
 from calib_core.results.systematic_errors import SystematicErrorResult
@@ -32,10 +33,9 @@ CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"
 def names_schema(text: str, schema: str) -> bool:
     """Return whether JSON text names a schema, without checking anything else."""
     try:
-        content = msgspec.json.decode(text)
-    except (msgspec.DecodeError, RecursionError):  # whoever reads it says what is wrong with it
+        return json_form(text, dict[str, Any]).get("schema") == schema
+    except InputError:  # whoever reads it says what is wrong with it
         return False
-    return isinstance(content, dict) and content.get("schema") == schema
 
 
 Vector2 = tuple[float, float]

@@ -8,10 +8,10 @@ from xml.etree.ElementTree import Element
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.mat_file import load_mat
-from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.interchange.syntax.xml_places import is_file_storage, opencv_values, parse_xml
-from calib_core.interchange.syntax.yaml_text import joined_documents, load_yaml_documents
+from calib_core.interchange.syntax.yaml_text import joined_documents
 from calib_core.interchange.syntax.zip_archives import unpack
+from calib_core.parsing import json_value, yaml_documents
 
 Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, other bytes, JSON, XML, text by its lines, text as YAML."""
@@ -106,6 +106,6 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     else:
         lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
         yield Content("lines", text=text, lines=tuple(lines))
-        documents = load_yaml_documents(text, source=source)
+        documents = yaml_documents(text, source=source)
         value = joined_documents(documents, source=source)
         yield Content("yaml", text=text, value=value, documents=documents)

@@ -1,11 +1,10 @@
-"""Read, check and write JSON; every error is one line that names the file, the place in it and what to do."""
+"""Check and write JSON; every error is one line that names the file, the place in it and what to do."""
 
 import dataclasses
 import json
 import math
 import re
 import types
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
 from types import MappingProxyType
@@ -16,13 +15,11 @@ import msgspec
 from calib_core.errors import InputError, meant
 from calib_core.input_files import other_kind
 from calib_core.json_forms import form_of, from_json, to_json
+from calib_core.parsing import json_value
 
 Document = TypeVar("Document")
 
-_MAX_DEPTH = 100
 _HALF = re.compile("[\ud800-\udfff]")
-MAX_CHARACTERS = 256 * 1024 * 1024
-"""Far more than any of our files; keeps a wrong file (a recording) from filling the memory."""
 
 
 def parse_document(text: str, document: type[Document], *, source: str) -> Document:
@@ -91,58 +88,6 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
         raise InputError(
             f"{source}: expected an object in braces, found {_shown(content)}; give a file in one of cocalib's formats"
         )
-    return content
-
-
-def json_value(text: str, *, source: str) -> Any:
-    """Parse JSON text; keys may not repeat within an object.
-
-    Raises:
-        InputError: it is not JSON.
-    """
-    if len(text) > MAX_CHARACTERS:
-        raise InputError(
-            f"{source}: {len(text):,} characters is too large for this kind of file; is it the right file?"
-        )
-    try:
-        content = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
-        if _is_too_deep(content):
-            raise RecursionError
-        return content
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        if not error.doc.strip():
-            raise InputError(f"{source}: the file is empty; was it copied completely?") from None
-        if error.pos >= len(error.doc.rstrip()):
-            raise InputError(
-                f"{source}: {where}: not JSON: the file ends too early; was it copied completely?"
-            ) from None
-        raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
-    except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise InputError(f"{source}: {reason}; correct the file") from None
-
-
-def _is_too_deep(content: Any) -> bool:
-    """Return whether values are nested deeper than any of our files, level by level: what walks them later recurses."""
-    level = [content]
-    for _ in range(_MAX_DEPTH):
-        level = [
-            inner
-            for value in level
-            if isinstance(value, dict | list)
-            for inner in (value.values() if isinstance(value, dict) else value)
-        ]
-        if not level:
-            return False
-    return True
-
-
-def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(items)
-    if len(content) != len(items):
-        twice = next(key for key, count in Counter(key for key, _ in items).items() if count > 1)
-        raise ValueError(f"the key {twice!r} appears twice in one object; keep one")
     return content
 
 

@@ -94,17 +94,25 @@ def _tag_end(text: str, start: int) -> int:
     return match.end() if match else start
 
 
-_MAX_CHARACTERS = 4 * 1024 * 1024
+_MAX_CHARACTERS = 32 * 1024 * 1024
 
 
-def parse_xml(text: str, *, source: str) -> ElementTree.Element:
+def parse_xml(text: str, *, source: str, most_marks: int = 100_000) -> ElementTree.Element:
     """Parse XML that has no document type, so no entity in it expands.
 
+    Args:
+        text: the file's content.
+        source: the name of the file in error messages.
+        most_marks: of its tags and attributes; up to 4 us each.
+
     Raises:
-        InputError: it is not XML, or declares entities.
+        InputError: it is not XML, declares entities, or is too large.
     """
-    if len(text) > _MAX_CHARACTERS or "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(f"{source}: too large for a calibration, or declares a document type; give a plain XML file")
+    is_large = len(text) > _MAX_CHARACTERS or text.count("<") + text.count("=") > most_marks
+    if is_large or "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(
+            f"{source}: too large for this kind of file, or declares a document type; give a plain XML file"
+        )
     try:
         return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
     except ElementTree.ParseError as error:

@@ -1,18 +1,12 @@
-"""Read YAML with the safe loader only, OpenCV's dialect too, with the place of every value; write numbers and names."""
+"""Read YAML with the place of every value; write numbers and names."""
 
 import json
-import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from calib_core.errors import InputError
-
-_MAX_CHARACTERS = 256 * 1024
-"""Half a megabyte of YAML takes ten seconds to parse."""
-_MAX_DEPTH = 100
-_OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
+from calib_core.parsing import yaml_documents, yaml_nodes
 
 
 def load_yaml(text: str, *, source: str) -> Any:
@@ -23,64 +17,7 @@ def load_yaml(text: str, *, source: str) -> Any:
     Raises:
         InputError: it is not YAML, has several documents, or is too large to be a calibration.
     """
-    return joined_documents(load_yaml_documents(text, source=source), source=source)
-
-
-def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
-    """Parse each document of a YAML text; empty ones are left out, such as after the last --- of `ros2 topic echo`.
-
-    Raises:
-        InputError: it is not YAML, or too large to be a calibration.
-    """
-    _require_small(text, source)
-    from ruamel.yaml import YAML
-    from ruamel.yaml.composer import Composer
-    from ruamel.yaml.constructor import SafeConstructor
-
-    class ShallowComposer(Composer):
-        """The composer, which gives up at a depth that no calibration has: its effort grows with the square of it."""
-
-        levels = 0
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            self.levels += 1
-            if self.levels > _MAX_DEPTH:
-                raise RecursionError
-            node = super().compose_node(parent, index)
-            self.levels -= 1
-            return node
-
-    class Constructor(SafeConstructor):
-        """The safe constructor with OpenCV's matrix tag."""
-
-    Constructor.add_constructor(_OPENCV_TAG, lambda self, node: self.construct_mapping(node, deep=True))
-    loader = YAML(typ="safe", pure=True)
-    loader.Composer, loader.Constructor = ShallowComposer, Constructor
-    # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
-    plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
-    with refuse_bad_yaml(text, plain, source=source):
-        return tuple(document for document in loader.load_all(plain) if document is not None)
-
-
-def _require_small(text: str, source: str) -> None:
-    if len(text) > _MAX_CHARACTERS:
-        raise InputError(
-            f"{source}: {len(text):,} characters, but at most {_MAX_CHARACTERS:,} are read of YAML and of transforms in JSON; is "
-            "it the right file? If so, keep only the calibration in it"
-        )
-
-
-@contextmanager
-def refuse_bad_yaml(text: str, plain: str, *, source: str) -> Iterator[None]:
-    """Turn a parser's errors about a text, from which a header may have been removed, into an InputError with the line."""
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        yield
-    except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
-        raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None
+    return joined_documents(yaml_documents(text, source=source), source=source)
 
 
 def joined_documents(documents: tuple[Any, ...], *, source: str) -> Any:
@@ -95,12 +32,6 @@ def joined_documents(documents: tuple[Any, ...], *, source: str) -> Any:
     if not all(isinstance(transforms, list) for transforms in listed):
         raise InputError(f"{source}: contains {len(documents)} YAML documents; keep only the intended one")
     return {"transforms": [transform for transforms in listed for transform in transforms or ()]}
-
-
-def _problem(error: Exception) -> str:
-    if isinstance(error, RecursionError):
-        return "nested too deeply"
-    return " ".join(str(getattr(error, "problem", None) or error).split())[:200]
 
 
 def number_text(value: float) -> str:
@@ -170,11 +101,7 @@ def placed_yaml(text: str, *, source: str) -> tuple[PlacedValue, ...]:
     Raises:
         InputError: it is not YAML, or too large to be a calibration.
     """
-    _require_small(text, source)
-    from ruamel.yaml import YAML
-
-    with refuse_bad_yaml(text, text, source=source):
-        nodes = list(YAML(typ="safe", pure=True).compose_all(text))
+    nodes = yaml_nodes(text, source=source)
     if any(node is not None and node.start_mark is None for node in nodes):
         raise InputError(f"{source}: the YAML cannot be located; write it without tags")
     return tuple(PlacedValue(node) for node in nodes if node is not None and node.value)

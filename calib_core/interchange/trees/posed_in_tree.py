@@ -1,6 +1,5 @@
 """The pose between the radar and the camera of a frame tree, chained over the joints between them."""
 
-import json
 import re
 from dataclasses import dataclass, replace
 
@@ -16,6 +15,7 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place, Sensor, joined
 from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
+from calib_core.parsing import json_value
 
 _STANDARD = 1e-4
 
@@ -157,6 +157,7 @@ def stated_joint(text: str, source: str) -> Joint | None:
         numbers = np.array(match[3].split(","), dtype=np.float64)
         written = WrittenPose("quaternion_xyzw", numbers[3:], numbers[:3], "radar_from_camera")
         place = Place(source, text.count("\n", 0, match.start()) + 1)
-        return Joint.posed(json.loads(match[2]), json.loads(match[1]), written, place)
+        parent, child = json_value(match[2], source=source), json_value(match[1], source=source)
+        return Joint.posed(parent, child, written, place)
     except ValueError:
         return None

@@ -12,6 +12,7 @@ from calib_core.interchange.format import Form, WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import placed_xml
 from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot, TreePart
+from calib_core.parsing import python_tree
 
 PUBLISHER = "static_transform_publisher"
 _QUATERNION = ("qx", "qy", "qz", "qw")
@@ -97,10 +98,7 @@ def _in_xml(text: str, source: str) -> Iterator[list[_Word]]:
 
 
 def _in_python(text: str, source: str) -> Iterator[list[_Word]]:
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError) as error:
-        raise InputError(f"{source}: not Python ({error}); correct it there") from None
+    tree = python_tree(text, source=source)
     lines = text.splitlines(keepends=True)
     starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
     for call in ast.walk(tree):

@@ -20,6 +20,8 @@ from typing import IO
 
 import numpy as np
 
+from calib_core.errors import InputError
+from calib_core.parsing import json_value
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 
@@ -175,7 +177,7 @@ def index_from(cache: FileCache) -> KeptIndex | None:
     if arrays is None:
         return None
     try:
-        words = json.loads(arrays["words"].tobytes())
+        words = json_value(arrays["words"].tobytes().decode(), source="")
         channels = tuple(Channel(**fields) for fields in words["channels"])
         names = tuple(words["compressions"][number] for number in arrays["compression"].tolist())
         edges = np.concatenate([[0], np.cumsum(arrays["counts"])])
@@ -189,7 +191,7 @@ def index_from(cache: FileCache) -> KeptIndex | None:
             int(number): MessageIndex(receive_ns[first:last], chunk[first:last], offset[first:last])
             for number, first, last in zip(arrays["ids"], edges[:-1], edges[1:], strict=True)
         }
-    except (KeyError, ValueError, TypeError, IndexError):
+    except (KeyError, ValueError, TypeError, IndexError, InputError):
         return None
     return KeptIndex(channels, chunks, names, indexes)
 

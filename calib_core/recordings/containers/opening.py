@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
-from calib_core.errors import RecordingError
+from calib_core.errors import InputError, RecordingError
+from calib_core.input_files import read_text
 from calib_core.measurements import DataWarning
+from calib_core.parsing import yaml_documents
 from calib_core.recordings.containers import sqlite as sqlite
 from calib_core.recordings.containers.chunks import ChannelFilter
 from calib_core.recordings.containers.compression import packing_of, unpacked_file
@@ -20,7 +22,6 @@ from calib_core.recordings.containers.sources import Source
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
-_MAX_METADATA_BYTES = 1 << 24
 _FIRST_ROWS = 500
 _FIRST_BYTES = 1 << 19  # usually enough for the first picture
 _LAST_BYTES = 1 << 16  # most of a file's metadata
@@ -170,13 +171,10 @@ def _is_recording(file: Path) -> bool:
 
 def _metadata(path: Path) -> dict[str, object]:
     """Read the relevant part of a metadata.yaml; empty if it is damaged or another kind of file."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     try:
-        content = YAML(typ="safe", pure=True).load(path) if path.stat().st_size <= _MAX_METADATA_BYTES else None
-    except (YAMLError, OSError, UnicodeDecodeError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
-        return {}  # ruamel's constructors raise the builtin ones for values that are not what their tags say
+        (content,) = yaml_documents(read_text(path, is_what="a metadata.yaml"), source=str(path))
+    except (InputError, ValueError):
+        return {}
     information = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
     return information if isinstance(information, dict) else {}
 
@@ -238,7 +236,10 @@ def _counts(information: dict[str, object], names: list[str]) -> dict[str, int]:
 def _packed_messages(metadata: Path, path: Path) -> bool:
     if path.suffix != ".db3" or not metadata.is_file():
         return False
-    return bool(_PACKED_MESSAGES.search(metadata.read_text(encoding="utf-8", errors="replace")))
+    try:
+        return bool(_PACKED_MESSAGES.search(read_text(metadata, is_what="a metadata.yaml")))
+    except InputError:
+        return False
 
 
 def _open(found: _Found) -> "_AnySource":

@@ -12,7 +12,7 @@ import numpy as np
 from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import json_rows
+from calib_core.parsing import json_rows, json_value
 from calib_core.recordings.camera.jpeg import picture_size_px
 
 _MAX_BYTES = 1 << 29
@@ -180,7 +180,8 @@ def _of_astyx(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
     file = folder.parent / "calibration" / f"{files[0].stem}.json"
     if not file.is_file() or file.stat().st_size > _MAX_BYTES:
         return None
-    sensors = {row["sensor_uid"]: row["calib_data"] for row in json.loads(file.read_text(encoding="utf-8"))["sensors"]}
+    content = json_value(file.read_text(encoding="utf-8"), source=str(file))
+    sensors = {row["sensor_uid"]: row["calib_data"] for row in content["sensors"]}
     pose = f"its pose: T_to_ref_COS of the radar and of {folder.name} in {file}: inverse(camera) @ radar"
     return FolderCamera(file, np.array(sensors[folder.name]["K"], dtype=np.float64), np.zeros(0), None, pose)
 
@@ -198,7 +199,4 @@ def _tokens_of(path: Path, names: set[str]) -> dict[str, None]:
 
 
 def _table(path: Path) -> list[Mapping[str, Any]]:
-    if path.stat().st_size > _MAX_BYTES:
-        return []
-    rows = json.loads(path.read_text(encoding="utf-8"))
-    return [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
+    return [row for row in json_rows(path, source=str(path)) if isinstance(row, dict)]

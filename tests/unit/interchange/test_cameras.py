@@ -143,7 +143,7 @@ def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coef
         ("a: 1\nb: 2\n", "no camera in it: looked for camera_matrix .*; found a, b"),
         ("- 1\n", "no camera in it: .*; found no keys"),
         ("a: [1\n", "line 2: not YAML"),
-        ("a: &x [*x, *x]\nK: *x\n", "K: "),
+        ("a: &x [*x, *x]\nK: *x\n", "line 1: "),
         ("!!python/object/apply:os.system ['true']\n", "not YAML"),
         (ROS.replace("500.5", ".nan"), "camera_matrix: 'nan' is not a valid number"),
         (ROS.replace("500.5", "fx"), "camera_matrix: 'fx' is not a valid number"),

@@ -12,6 +12,7 @@ import pytest
 import yaml
 from scipy.io import savemat
 
+from calib_core import parsing
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
@@ -24,7 +25,6 @@ from calib_core.interchange import (
     read_calibration,
     write_calibration,
 )
-from calib_core.interchange.syntax import strict_json
 
 
 def with_camera(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:
@@ -200,5 +200,5 @@ def test_a_repeated_key_is_found_without_comparing_all_keys():
 
     keys = [Key(f"k{number}") for number in range(2000)]
     with pytest.raises(ValueError, match="'k1999' appears twice"):
-        strict_json._without_repeats([(key, 1) for key in (*keys, Key("k1999"))])
+        parsing._without_repeats([(key, 1) for key in (*keys, Key("k1999"))])
     assert len(compared) < 100

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import msgspec
 
-from calib_core.errors import CalibrationError
-from calib_core.json_forms import from_json, to_json
+from calib_core.errors import CalibrationError, InputError
+from calib_core.json_forms import to_json
+from calib_core.parsing import json_form
 from cocalib.session import JournalStep, Step
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm
@@ -402,14 +403,14 @@ def _head(line: bytes, place: str) -> tuple[_Head | None, str]:
     if found.sum and not found.follows(""):
         return None, "its checksum is wrong"
     try:
-        written = msgspec.json.decode(found.content, type=_Version)
+        written = json_form(found.content, _Version)
         if written.schema != SCHEMA:
             raise SessionFileError(
                 f"{place}: written as '{written.schema}' by cocalib {written.cocalib}, but this version reads '{SCHEMA}'; "
                 "open it with that version, or give another --session folder"
             )
-        head = msgspec.json.decode(found.content, type=_Head)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        head = json_form(found.content, _Head)
+    except InputError as error:
         return None, str(error)
     return (head, "") if found.sum else (None, "its checksum is missing")
 
@@ -421,6 +422,6 @@ def _step(content: bytes) -> Step:
         ValueError: it is none.
     """
     try:
-        return msgspec.json.decode(content, type=Line, dec_hook=from_json).step
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
+        return json_form(content, Line).step
+    except CalibrationError as error:
         raise ValueError(str(error)) from error

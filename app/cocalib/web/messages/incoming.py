@@ -1,7 +1,7 @@
 """What a page may send: text in, commands out."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import msgspec
 from msgspec import Meta
@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from calib_core.errors import InputError, meant
 from calib_core.json_forms import from_json
 from calib_core.measurements import TimeNs
+from calib_core.parsing import json_form
 from cocalib.option_changes import changes_from_tree
 from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
 from cocalib.session.events import Id
@@ -219,8 +220,8 @@ def parse(text: str | bytes) -> Incoming:
     if len(text) > MAX_TEXT_BYTES:
         raise InputError(f"the message is longer than {MAX_TEXT_BYTES // 2**20} MB, the maximum")
     try:
-        fields = msgspec.json.decode(text)
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        fields = json_form(text, dict[str, Any])
+    except InputError as error:
         raise InputError(f"the message is not JSON: {error}") from error
     kind = _kind(fields)
     request = None if kind == "frame" else fields.pop("request", None)
@@ -234,23 +235,21 @@ def parse(text: str | bytes) -> Incoming:
 def request_of(text: str | bytes) -> int | None:
     """Return the request number of a message that `parse` refused; None if it has none that can be read."""
     try:
-        return msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Envelope).request
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return json_form(text[:MAX_TEXT_BYTES], _Envelope).request
+    except InputError:
         return None
 
 
 def is_about_opening(text: str | bytes) -> bool:
     """Return whether a message that `parse` refused was about the choice of a recording."""
     try:
-        kind = msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Named).type
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        kind = json_form(text[:MAX_TEXT_BYTES], _Named).type
+    except InputError:
         return False
     return kind in _TYPES and issubclass(_TYPES[kind], OpeningCommand)
 
 
-def _kind(fields: object) -> str:
-    if not isinstance(fields, dict):
-        raise InputError('the message is not a JSON object; expected one with a "type"')
+def _kind(fields: dict[str, Any]) -> str:
     kind = fields.get("type")
     if isinstance(kind, str) and kind in _TYPES:
         return kind

@@ -1,6 +1,5 @@
 """Read radar returns from JSON: one return or one scan per line or array element, with nested objects and lists."""
 
-import json
 import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.errors import RecordingError
+from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import other_kind
+from calib_core.parsing import json_rows, json_value
 from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
 _MAX_BYTES = 1 << 28
 _SAMPLED_ROWS = 500
-_DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _LAST_BYTES = 1 << 20
 _POINTS = ("position", "pos", "xyz", "point", "location", "coordinates")
 _NOTHING = ("", "null", "none")
@@ -87,9 +86,11 @@ def _is_cut_off(path: Path) -> bool:
     with path.open("rb") as file:
         file.seek(max(path.stat().st_size - _LAST_BYTES, 0))
         last = file.read().rpartition(b"\n")[2]
+    if not last.strip() or path.suffix.lower() == ".json":
+        return False
     try:
-        return bool(last.strip()) and path.suffix.lower() != ".json" and not _parse(last.decode("utf-8", "replace"))
-    except (ValueError, RecursionError):
+        return not json_value(last.decode("utf-8", "replace"), source=path.name)
+    except InputError:
         return True
 
 
@@ -111,19 +112,33 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
 def _records(path: Path) -> Iterator[tuple[int, Any]]:
     """Yield the lines of JSON lines, or the elements of an array, or one object."""
     try:
-        if path.suffix.lower() == ".json" and path.stat().st_size <= _MAX_BYTES:
-            text = path.read_text(encoding="utf-8-sig")
-            try:
-                whole = _parse(text)
-            except ValueError:
-                if not re.search(r"\}\s*\n", text):
-                    raise
-            else:
-                yield from enumerate(whole if isinstance(whole, list) else [whole], start=1)
-                return
-        yield from _lines(path)
-    except (OSError, ValueError, RecursionError) as error:
+        if path.suffix.lower() != ".json":
+            yield from _lines(path)
+        elif _begins_a_list(path):
+            yield from enumerate(json_rows(path, source=str(path), numbers_as_text=True), start=1)
+        else:
+            yield from _object_or_lines(path)
+    except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path}: cannot be read as JSON: {error}") from error
+    except InputError as error:
+        raise RecordingError(str(error)) from None
+
+
+def _begins_a_list(path: Path) -> bool:
+    with path.open(encoding="utf-8-sig") as file:
+        return file.read(_LAST_BYTES).lstrip().startswith("[")
+
+
+def _object_or_lines(path: Path) -> Iterator[tuple[int, Any]]:
+    text = path.read_text(encoding="utf-8-sig") if path.stat().st_size <= _MAX_BYTES else ""
+    try:
+        whole = json_value(text, source=str(path), numbers_as_text=True)
+    except InputError as error:
+        if text and not re.search(r"\}\s*\n", text):
+            raise RecordingError(f"{error}; JSON lines, one object per line, are read in any size") from None
+        yield from _lines(path)
+    else:
+        yield 1, whole
 
 
 def _lines(path: Path) -> Iterator[tuple[int, Any]]:
@@ -131,18 +146,11 @@ def _lines(path: Path) -> Iterator[tuple[int, Any]]:
         for number, line in enumerate(file, start=1):
             if line.strip():
                 try:
-                    yield number, _parse(line)
-                except (ValueError, RecursionError) as error:
+                    yield number, json_value(line.rstrip(), source=f"{path}: line {number}", numbers_as_text=True)
+                except InputError as error:
                     if number > 1 and not line.endswith("\n"):
                         return  # see _is_cut_off
-                    raise RecordingError(
-                        f"{path}: line {number}: not JSON ({error}); fix or remove the line"
-                    ) from error
-
-
-def _parse(text: str) -> Any:
-    """Parse JSON; numbers stay text, because a float rounds nanoseconds."""
-    return _DECODER.decode(text)
+                    raise RecordingError(f"{error}; fix or remove the line") from None
 
 
 def _rows_of(value: Any, prefix: str, above: Mapping[str, str]) -> Iterator[dict[str, str]]:

@@ -1,8 +1,8 @@
 """The outcome's file is read strictly."""
 
-import msgspec
 import pytest
 
+from calib_core.errors import InputError
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
 from cocalib.batch.schemas import write_batch_schemas
 
@@ -37,7 +37,7 @@ def test_what_is_written_is_read():
     ],
 )
 def test_anything_else_is_refused(text):
-    with pytest.raises(msgspec.DecodeError):
+    with pytest.raises(InputError):
         read_outcome(text)
 
 

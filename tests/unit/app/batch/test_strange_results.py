@@ -4,10 +4,9 @@ import json
 import os
 from pathlib import Path
 
-import msgspec
 import pytest
 
-from calib_core.errors import CalibrationError
+from calib_core.errors import CalibrationError, InputError
 from cocalib.batch import inputs
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
@@ -89,7 +88,7 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name, tmp_path)
     outcome["files"][0]["name"] = name
     place.write_text(json.dumps(outcome))
     assert folder.outcome(DIGEST) is None
-    with pytest.raises(msgspec.ValidationError, match=r"files\[0\]\.name"):
+    with pytest.raises(InputError, match=r"files\[0\]\.name"):
         read_outcome(place.read_text())
 
 
