@@ -16,7 +16,7 @@ import numpy as np
 from calib_core.proposing.apex import Apex, find_apex
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
-from tests.unit.proposing.trihedral import background, draw_look, picture
+from tests.unit.proposing.trihedral import background, draw_look, noisy_image
 
 _SCENES = ("rooftop", "field", "aisle", "checkerboard")
 _SIZES = ((960, 540), (1920, 1080))
@@ -126,7 +126,7 @@ def _our_own(seed: int, count: int) -> Iterator[Place]:
         for number in range(count):
             rng = np.random.default_rng([seed, int(low_px), number])
             look = draw_look(rng, size_px=side, width_px=float(rng.uniform(low_px, high_px)))
-            image = picture(look, background(rng, side), rng)
+            image = noisy_image(look, background(rng, side), rng)
             yield Place(
                 f"ray by ray, {low_px:.0f} to {high_px:.0f} px wide", image, look.apex_px + _offset(rng), look.apex_px
             )
@@ -135,7 +135,7 @@ def _our_own(seed: int, count: int) -> Iterator[Place]:
         look = replace(draw_look(rng, size_px=side, width_px=1.0), apex_px=np.array([4.0, 4.0]))
         yield Place(
             "ray by ray, blocks, lines and texture",
-            picture(look, background(rng, side), rng),
+            noisy_image(look, background(rng, side), rng),
             np.array([110.0, 110.0]),
             None,
         )

@@ -52,7 +52,7 @@ class _Background:
 
 
 def changed_boxes(
-    image: Callable[[int], np.ndarray],
+    read_image: Callable[[int], np.ndarray],
     image_times: TimesNs,
     *,
     source: str = MOVING,
@@ -65,7 +65,7 @@ def changed_boxes(
     frames is looked at in stretches of 6 s at 5 Hz, evenly spread: within a stretch an object keeps its track.
 
     Args:
-        image: returns frame i as uint8 (h, w, 3); raises MessageError for one that cannot be read.
+        read_image: returns frame i as uint8 (h, w, 3); raises MessageError for one that cannot be read.
         image_times: (m,) stamps of the frames, ascending.
         source: for messages.
         most_frames: how many frames to look at.
@@ -74,7 +74,7 @@ def changed_boxes(
     Raises:
         InputError: there are too few readable frames, nothing moves, or the camera itself does.
     """
-    pictures = list(_readable(image, _spread(len(image_times), _BACKGROUND_FRAMES)))
+    pictures = list(_readable(read_image, _spread(len(image_times), _BACKGROUND_FRAMES)))
     if len(pictures) < _FEWEST_FRAMES:
         raise InputError(
             f"{source}: {len(pictures)} readable frames; finding movement needs {_FEWEST_FRAMES} or more: record for longer"
@@ -91,7 +91,7 @@ def changed_boxes(
     first_track = 1
     for stretch in stretches:
         found = []
-        for index, picture in _readable(image, stretch):
+        for index, picture in _readable(read_image, stretch):
             found.append((TimeNs(int(image_times[index])), _regions(_changed(_reduced(picture), background), size)))
             if progress:
                 progress(len(named) + len(found), total)
@@ -104,12 +104,12 @@ def changed_boxes(
     return Boxes(tuple(named), source, size, (note,))
 
 
-def _readable(image: Callable[[int], np.ndarray], indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+def _readable(read_image: Callable[[int], np.ndarray], indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
     """Yield the frames that can be read and have one size: that of the first."""
     shape: tuple[int, ...] = ()
     for index in indices:
         with contextlib.suppress(MessageError):
-            picture = image(index)
+            picture = read_image(index)
             shape = shape or picture.shape
             if picture.shape == shape:
                 yield index, picture

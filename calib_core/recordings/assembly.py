@@ -122,10 +122,10 @@ def assemble(
     clocks, stamps, about_choice = _clocks(used, stamped, inventory, options, before)
     warnings.extend([*lost, *choice.warnings, *about_choice])
     radar = _radar_stream(used, choice, inventory, stamps, stamped)
-    images, about_pictures = frames_of_one_size(_image_stream(used.image, inventory, stamps))
+    images, about_sizes = frames_of_one_size(_image_stream(used.image, inventory, stamps))
     if before is not None:
         return replace(before, radar=radar, images=images)
-    warnings.extend(about_pictures)
+    warnings.extend(about_sizes)
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
     diagnoses = _diagnoses(stamped, (*(radar.parts if radar else ()), images), clocks, inventory, options)

@@ -100,13 +100,13 @@ def write_video(
         raise RecordingError(
             f"{recording.name}: none of its {len(recording.image_times)} frames can be read: {skipped.fault}"
         )
-    start, picture = first
+    start, first_image = first
     options = {} if form == "matroska" else {"video_track_timescale": str(10**9 // _TICK_NS)}
     count, ticks = 0, -1
     with av.open(str(path), "w", format=form, options=options) as container:
         container.metadata["comment"] = TAG
         stream = container.add_stream("mjpeg")
-        stream.width, stream.height, stream.pix_fmt = picture.width_px, picture.height_px, "yuvj420p"
+        stream.width, stream.height, stream.pix_fmt = first_image.width_px, first_image.height_px, "yuvj420p"
         stream.time_base = Fraction(_TICK_NS, 10**9)
         while first is not None:
             time, image = first

@@ -18,7 +18,7 @@ const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
 const SQUARES_FROM = 8;
 /** Room around a mark that no toast covers [CSS px]. */
 const MARK_PX = 24;
-let drawPicture = false;
+let paintFrame = false;
 let drawInk = false;
 const words = /** @type {HTMLElement} */ (document.getElementById("picture-words"));
 /** The picture is described once nothing has changed for this long [ms], so that a screen reader can finish. */
@@ -93,7 +93,7 @@ function takeSize() {
 
 /** Draw everything with the next screen frame. */
 export function redraw() {
-  drawPicture = true;
+  paintFrame = true;
   redrawMarks();
 }
 
@@ -104,8 +104,8 @@ function redrawMarks() {
 }
 
 function paint() {
-  if (drawPicture || !drawInk) paintPicture();
-  drawPicture = drawInk = false;
+  if (paintFrame || !drawInk) paintPicture();
+  paintFrame = drawInk = false;
   ink.setTransform(1, 0, 0, 1, 0, 0);
   ink.clearRect(0, 0, marks.width, marks.height);
   if (state.shown) drawLayers(ink);

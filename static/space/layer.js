@@ -155,7 +155,7 @@ function draw() {
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
   const look = lookShown();
-  if (spaceOptions.camera) drawPicture(look);
+  if (spaceOptions.camera) paintFrame(look);
   const place = placing();
   if (look && place && !isLate(look)) drawLook(look, place, new Board(width, height));
   for (const [how, colour] of /** @type {["hover"|"picked", string][]} */ ([["picked", "accent"], ["hover", "ink"]])) {
@@ -196,7 +196,7 @@ function drawLook(look, place, board) {
 }
 
 /** The page's own picture, as large as it fits. @param {Look|null} look */
-function drawPicture(look) {
+function paintFrame(look) {
   pen.fillStyle = themeColour("ground");
   pen.fillRect(0, 0, layer.clientWidth, layer.clientHeight);
   const [box, shown] = [pictureBox(), state.shown];

@@ -56,7 +56,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clip();
   drawRuler(pen, lanes.left, width, height, axis);
   drawRadar(pen, boxes.radar, axis);
-  drawPicture(pen, boxes.picture, axis);
+  paintFrame(pen, boxes.picture, axis);
   pen.fillStyle = themeColour("line-strong");
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
@@ -152,7 +152,7 @@ function drawRadar(pen, { top, bottom }, axis) {
 }
 
 /** How much the picture changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
-function drawPicture(pen, { top, bottom }, axis) {
+function paintFrame(pen, { top, bottom }, axis) {
   if (bottom === top) return;
   pen.fillStyle = themeColour("attention");
   const most = Math.max(MUCH, ...changes.grey_levels);

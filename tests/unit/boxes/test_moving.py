@@ -22,7 +22,7 @@ def walker(index: int, count: int) -> tuple[int, int, int, int]:
     return left, 40, left + 12, 80
 
 
-def picture(index: int, count: int, *, gain: float = 1.0, shadow: bool = False) -> np.ndarray:
+def scene_image(index: int, count: int, *, gain: float = 1.0, shadow: bool = False) -> np.ndarray:
     rng = np.random.default_rng(index)
     values = SCENE * gain + rng.normal(0, 1.0, SCENE.shape)
     left, top, right, bottom = walker(index, count)
@@ -38,7 +38,7 @@ def test_a_thing_that_moves_is_boxed_and_keeps_its_track(changes):
 
     def image(index: int) -> np.ndarray:
         gain = 1.0 + 0.2 * (index / count) if changes == "brightness" else 1.0
-        return picture(index, count, gain=gain, shadow=changes == "shadow")
+        return scene_image(index, count, gain=gain, shadow=changes == "shadow")
 
     boxes = changed_boxes(image, times(count))
 
@@ -59,7 +59,7 @@ def test_pictures_are_reduced_and_boxes_are_in_recorded_pixels():
     count = 10
 
     def image(index: int) -> np.ndarray:
-        return picture(index, count).repeat(6, axis=0).repeat(6, axis=1)
+        return scene_image(index, count).repeat(6, axis=0).repeat(6, axis=1)
 
     box: Box = changed_boxes(image, times(count)).frames[4].boxes[0]
 
@@ -73,7 +73,7 @@ def test_a_long_recording_is_looked_at_in_stretches():
 
     def image(index: int) -> np.ndarray:
         decoded.append(index)
-        return picture(index, count)
+        return scene_image(index, count)
 
     boxes = changed_boxes(image, times(count), most_frames=60)
 
@@ -90,7 +90,7 @@ def test_unreadable_frames_are_skipped():
     def image(index: int) -> np.ndarray:
         if index % 2:
             raise MessageError("damaged")
-        return picture(index, count)
+        return scene_image(index, count)
 
     assert changed_boxes(image, times(count)).times_ns.tolist() == times(count)[::2].tolist()
 
@@ -104,7 +104,7 @@ def test_a_camera_that_moves_is_refused():
 
 def test_too_few_frames_are_refused():
     with pytest.raises(InputError, match="3 readable frames; finding movement needs 5"):
-        changed_boxes(lambda index: picture(index, 3), times(3))
+        changed_boxes(lambda index: scene_image(index, 3), times(3))
 
 
 def test_pictures_in_which_nothing_moves_are_refused():

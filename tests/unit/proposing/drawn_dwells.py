@@ -90,24 +90,24 @@ class DrawnFrames:
         if index in self.broken:
             raise CalibrationError(f"frame {index} is broken")
         time_s = 0.5 * index
-        picture = wall()
+        drawn = wall()
         for dwell in self.dwells:
             if dwell.start_s <= time_s <= dwell.end_s:
-                _draw_reflector(picture, dwell.apex_px, _REFLECTOR_M / dwell.range_m * _FOCAL_PX)
+                _draw_reflector(drawn, dwell.apex_px, _REFLECTOR_M / dwell.range_m * _FOCAL_PX)
         for start_s, end_s, left, top, width, height in self.people:
             if start_s <= time_s <= end_s:
-                picture[top : top + height, left : left + width] = (50, 40, 45)
-        picture = np.roll(picture, self.moved_px[::-1], axis=(0, 1))
-        noisy = picture + np.random.default_rng(index).normal(0.0, 1.0, picture.shape)
+                drawn[top : top + height, left : left + width] = (50, 40, 45)
+        drawn = np.roll(drawn, self.moved_px[::-1], axis=(0, 1))
+        noisy = drawn + np.random.default_rng(index).normal(0.0, 1.0, drawn.shape)
         gains = self.gains[int(time_s)] if int(time_s) < len(self.gains) else (1.0, 1.0, 1.0)
         return np.asarray((noisy * np.array(gains)).clip(0.0, 255.0).astype(np.uint8))
 
 
-def _draw_reflector(picture: np.ndarray, apex_px: tuple[float, float], width_px: float) -> None:
+def _draw_reflector(drawn: np.ndarray, apex_px: tuple[float, float], width_px: float) -> None:
     """Fill three sheets that meet at the apex, smoothly."""
     reach = int(width_px) + 2
     left, top = (int(v) - reach for v in apex_px)
-    part = picture[top : top + 2 * reach, left : left + 2 * reach]
+    part = drawn[top : top + 2 * reach, left : left + 2 * reach]
     fine = cv2.resize(part, None, fx=_FINE, fy=_FINE, interpolation=cv2.INTER_NEAREST)
     turns = np.deg2rad([-90.0, 30.0, 150.0])
     tips = np.stack([np.cos(turns), np.sin(turns)], axis=1) * 0.58 * width_px + apex_px

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib_core.proposing.apex import Apex, NoApex, find_apex
-from tests.unit.proposing.trihedral import Look, background, draw_look, picture
+from tests.unit.proposing.trihedral import Look, background, draw_look, noisy_image
 
 _SIDE = (200, 200)
 
@@ -30,7 +30,7 @@ def _found(image: np.ndarray, near_px: np.ndarray, **options: float) -> Apex:
 def test_the_apex_is_found_below_a_pixel_at_every_width():
     for width_px in (16.0, 30.0, 60.0, 120.0, 180.0):
         look, behind, rng = _look(width_px)
-        apex = _found(picture(look, behind, rng), look.apex_px + np.array([5.0, -4.0]))
+        apex = _found(noisy_image(look, behind, rng), look.apex_px + np.array([5.0, -4.0]))
         assert np.hypot(*(apex.pixel_px - look.apex_px)) < 0.6
         assert 0.05 < apex.sigma_px < 0.6
 
@@ -41,7 +41,7 @@ def test_errors_are_as_large_as_their_covariance_says():
     for number in range(60):
         rng = np.random.default_rng([31, number])
         look = draw_look(rng, size_px=_SIDE, width_px=float(rng.uniform(25.0, 50.0)))
-        answer = find_apex(picture(look, background(rng, _SIDE), rng), look.apex_px + rng.uniform(-5.0, 5.0, 2))
+        answer = find_apex(noisy_image(look, background(rng, _SIDE), rng), look.apex_px + rng.uniform(-5.0, 5.0, 2))
         if isinstance(answer, Apex):
             error = answer.pixel_px - look.apex_px
             squares.append(float(error @ np.linalg.solve(answer.covariance_px2, error)))
@@ -53,7 +53,7 @@ def test_errors_are_as_large_as_their_covariance_says():
 
 def test_the_given_pixel_does_not_pull_the_apex():
     look, behind, rng = _look()
-    image = picture(look, behind, rng)
+    image = noisy_image(look, behind, rng)
     first = _found(image, look.apex_px)
     for number in range(12):
         turn = 2.0 * np.pi * number / 12.0
@@ -64,14 +64,14 @@ def test_the_given_pixel_does_not_pull_the_apex():
 
 def test_an_apex_beyond_reach_is_not_taken():
     look, behind, rng = _look()
-    image = picture(look, behind, rng)
+    image = noisy_image(look, behind, rng)
     assert isinstance(find_apex(image, look.apex_px + np.array([18.0, 0.0])), NoApex)
     assert isinstance(find_apex(image, look.apex_px + np.array([18.0, 0.0]), reach_px=25.0), Apex)
 
 
 def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex():
     look, behind, rng = _look()
-    image = picture(look, behind, rng)
+    image = noisy_image(look, behind, rng)
     last = image.shape[1] - 1.0
     apex = _found(image, look.apex_px + 3.0).pixel_px
     near = look.apex_px + 3.0
@@ -86,16 +86,16 @@ def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex(
 def test_exposure_and_colour_do_not_move_the_apex():
     look, behind, rng = _look()
     quiet = replace(look, noise_grey=0.0, jpeg_quality=None)
-    apex = _found(picture(quiet, behind, rng), look.apex_px + 3.0).pixel_px
-    darker = _found(picture(replace(quiet, gain=0.5), behind, rng), look.apex_px + 3.0).pixel_px
+    apex = _found(noisy_image(quiet, behind, rng), look.apex_px + 3.0).pixel_px
+    darker = _found(noisy_image(replace(quiet, gain=0.5), behind, rng), look.apex_px + 3.0).pixel_px
     assert darker == pytest.approx(apex, abs=0.1)
-    coloured = cv2.cvtColor(picture(quiet, behind, rng), cv2.COLOR_GRAY2BGR)
+    coloured = cv2.cvtColor(noisy_image(quiet, behind, rng), cv2.COLOR_GRAY2BGR)
     assert _found(coloured, look.apex_px + 3.0).pixel_px == pytest.approx(apex, abs=1e-6)
 
 
 def test_a_reflector_at_the_rim_of_the_picture_is_found_or_refused():
     look, behind, rng = _look()
-    image = picture(look, behind, rng)
+    image = noisy_image(look, behind, rng)
     column, row = (int(v) for v in look.apex_px)
     corner_px = np.array([column - 4, row - 4])
     answer = find_apex(image[row - 4 :, column - 4 :], look.apex_px - corner_px)
@@ -144,17 +144,17 @@ def test_backgrounds_and_the_outer_tips_of_a_reflector_are_refused():
     for number in range(30):
         rng = np.random.default_rng([77, number])
         look = replace(draw_look(rng, size_px=_SIDE, width_px=1.0), apex_px=np.array([4.0, 4.0]))
-        false += isinstance(find_apex(picture(look, background(rng, _SIDE), rng), np.array([100.0, 100.0])), Apex)
+        false += isinstance(find_apex(noisy_image(look, background(rng, _SIDE), rng), np.array([100.0, 100.0])), Apex)
     assert false <= 2
     look, behind, rng = _look(120.0)
     tips = [look.apex_px + 62.0 * np.array([np.cos(t), np.sin(t)]) for t in np.linspace(0.0, 6.0, 12)]
-    assert not any(isinstance(find_apex(picture(look, behind, rng), tip), Apex) for tip in tips)
+    assert not any(isinstance(find_apex(noisy_image(look, behind, rng), tip), Apex) for tip in tips)
 
 
 def test_two_reflectors_within_reach_are_refused_by_name():
     look, behind, rng = _look(17.0)
     one = replace(look, apex_px=np.array([92.0, 100.0]), noise_grey=0.0, jpeg_quality=None)
-    image = picture(one, behind, rng)
+    image = noisy_image(one, behind, rng)
     image[:, 101:] = image[:, 83:182]
     answer = find_apex(image, np.array([101.0, 100.0]))
     assert isinstance(answer, NoApex)
@@ -163,7 +163,7 @@ def test_two_reflectors_within_reach_are_refused_by_name():
 
 def test_a_corner_larger_than_the_reflector_is_refused():
     look, behind, rng = _look(180.0)
-    image = picture(look, behind, rng)
+    image = noisy_image(look, behind, rng)
     answer = find_apex(image, look.apex_px, size_px=15.0)
     assert isinstance(answer, NoApex)
     assert "beyond a reflector of 15 px" in answer.reason

@@ -84,7 +84,7 @@ def _axes(rng: np.random.Generator) -> np.ndarray:
     return axes if np.linalg.det(axes) > 0.0 else axes[[1, 0, 2]]
 
 
-def picture(look: Look, behind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def noisy_image(look: Look, behind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return the picture as grey levels (h, w) uint8.
 
     Args:

@@ -14,7 +14,7 @@ from calib_core.recordings.camera.images import EncodedImage
 from cocalib.web.channel.channel import snapped
 from cocalib.web.frames import FrameStore
 from cocalib.web.messages import Snapped, SnapWanted, encode, parse
-from tests.unit.proposing.trihedral import draw_look, picture
+from tests.unit.proposing.trihedral import draw_look, noisy_image
 
 _RNG = np.random.default_rng(5)
 _LOOK = replace(
@@ -27,7 +27,7 @@ class _OnePicture:
     """A recording whose frames all show the same reflector."""
 
     def image_bytes(self, index: int) -> EncodedImage:
-        image = picture(_LOOK, np.full((200, 200), 0.25), np.random.default_rng(index))
+        image = noisy_image(_LOOK, np.full((200, 200), 0.25), np.random.default_rng(index))
         return EncodedImage(cv2.imencode(".png", image)[1].tobytes(), "png", 200, 200)
 
 
