@@ -8,7 +8,7 @@ PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,association diagnostics estimation interchange results)
 
-.PHONY: help env dev demo docs test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample picture clean
+.PHONY: help env dev demo docs test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample image clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -83,9 +83,9 @@ paper: dev  ## Repeat the paper's experiments on simulated sessions; write docs/
 sample: env  ## Regenerate sample_data/.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data
 
-picture: dev  ## Retake the README's pictures.
+image: dev  ## Retake the README's images.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/python docs/take_pictures.py
+	$(BIN)/python docs/take_images.py
 
 lock: dev  ## Update all pins, with hashes and without index URLs (needs uv).
 	@sh .ci/lock

@@ -1,6 +1,6 @@
 """How often the reflector's apex is found, how well, and how often where there is none: python -m benchmarks.apex
 
-Each row draws places from pictures that were not used to set limits or covariance. A found apex is wrong if it is farther from
+Each row draws places from images that were not used to set limits or covariance. A found apex is wrong if it is farther from
 the truth than 1.5 px and four of its own sigmas. The last columns hold the share of errors inside the 50, 90 and 99 % ellipses.
 """
 
@@ -28,7 +28,7 @@ _QUANTILES = (1.386, 4.605, 9.210)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A picture, where to search, and the true apex; None if there is none."""
+    """An image, where to search, and the true apex; None if there is none."""
 
     row: str
     image: np.ndarray
@@ -40,13 +40,11 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=7000)
-    parser.add_argument("--own", type=int, default=200, help="pictures of our own per width")
+    parser.add_argument("--own", type=int, default=200, help="images of our own per width")
     parser.add_argument("--photos", type=Path, default=Path("../shared/data/real_checkerboards"))
     arguments = parser.parse_args()
     seconds: list[float] = []
-    print(
-        "| pictures | n | found | wrong | median error [px] | 95 % [px] | median sigma [px] | in 50 % | 90 % | 99 % |"
-    )
+    print("| images | n | found | wrong | median error [px] | 95 % [px] | median sigma [px] | in 50 % | 90 % | 99 % |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
     for family in (
         _our_own(arguments.seed, arguments.own),
@@ -120,7 +118,7 @@ def _simulated(seed: int) -> Iterator[Place]:
 
 
 def _our_own(seed: int, count: int) -> Iterator[Place]:
-    """Yield places in pictures of `tests.unit.proposing.trihedral`, and in their backgrounds alone."""
+    """Yield places in images of `tests.unit.proposing.trihedral`, and in their backgrounds alone."""
     side = (220, 220)
     for low_px, high_px in _OWN_WIDTHS_PX:
         for number in range(count):

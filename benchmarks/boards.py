@@ -1,4 +1,4 @@
-"""Pictures of calibration boards of every kind, with the true corners: bent, moving, before a cluttered room, in bad light."""
+"""Images of calibration boards of every kind, with the true corners: bent, moving, before a cluttered room, in bad light."""
 
 from dataclasses import dataclass
 
@@ -65,7 +65,7 @@ def render_board(
         board: which board.
         camera: the lens.
         camera_from_board: the board's pose when the middle row is exposed.
-        film: what the picture suffers.
+        film: what the image suffers.
         seed: of the background and the noise.
         background: (h, w) grey levels behind the board; None draws a cluttered room.
     """

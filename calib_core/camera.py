@@ -204,7 +204,7 @@ class Camera:
         return visible & same
 
     def scaled(self, factor: float) -> "Camera":
-        """Return the camera for the picture resized by a factor, with pixel centres kept in place."""
+        """Return the camera for the image resized by a factor, with pixel centres kept in place."""
         matrix = self.matrix_px.copy()
         matrix[:2, :2] *= factor
         matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
@@ -214,7 +214,7 @@ class Camera:
         )
 
     def windowed(self, offset_px: tuple[int, int], size_px: tuple[int, int], binning: tuple[int, int]) -> "Camera":
-        """Return the camera for a part of the picture whose pixels are binned (REP 104): the full sensor's column u becomes
+        """Return the camera for a part of the image whose pixels are binned (REP 104): the full sensor's column u becomes
         (u - offset + 1/2) / binning - 1/2, which keeps pixel centres at integers.
 
         Args:
@@ -230,7 +230,7 @@ class Camera:
         return Camera(self.model, width, height, matrix, self.distortion, self._rescaled_covariance(1.0 / by))
 
     def _rescaled_covariance(self, factors: Values) -> CameraCovariance | None:
-        """Return the covariance for a picture whose columns and rows are so many times as many (2,)."""
+        """Return the covariance for an image whose columns and rows are so many times as many (2,)."""
         if self.covariance is None:
             return None
         by_name = dict(zip(_MATRIX_NAMES, np.tile(factors, 2).tolist(), strict=True))

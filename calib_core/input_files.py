@@ -20,9 +20,9 @@ _BEGINNINGS = {
         (b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"), "a recording; give it as RECORDING, or with --recording"
     ),
     b"PK": "an archive or a spreadsheet; unpack it, or save it as CSV",
-    b"\x89PNG": "a picture",
+    b"\x89PNG": "an image",
     b"\x93NUMPY": "an array of another shape; save camera_from_radar as a 4x4 array",
-    b"\xff\xd8\xff": "a picture",
+    b"\xff\xd8\xff": "an image",
 }
 _USES = {
     "calibration-1": "give it with --calibration FILE (evaluate: as CALIBRATION, first); solve it again with --pairs FILE",

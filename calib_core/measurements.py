@@ -61,7 +61,7 @@ def time_parts(time: TimeNs) -> tuple[int, int]:
 
 
 Mark: TypeAlias = Literal["clicked", "moved", "snapped", "untouched"]
-"""How a click came to its pixel: set or moved by a person, snapped to the reflector's apex in the picture, or left untouched
+"""How a click came to its pixel: set or moved by a person, snapped to the reflector's apex in the image, or left untouched
 where the radar expected it; the last is no measurement."""
 
 
@@ -494,7 +494,7 @@ class Boxes:
     Attributes:
         frames: in order of time, each stamp once.
         source: where they come from, for messages: a file's name or a topic.
-        image_size_px: width and height of the pictures that they were made on; None if the source states none.
+        image_size_px: width and height of the images that they were made on; None if the source states none.
         notes: what reading took for granted, as sentences without their final periods.
     """
 

@@ -119,7 +119,7 @@ class LensOptions:
     )
     principal_point_sigma_px: float = option(
         5.0,
-        "Standard deviation of the principal point, per axis [px of a picture 1920 px wide; scaled to the width].",
+        "Standard deviation of the principal point, per axis [px of an image 1920 px wide; scaled to the width].",
         low=0.0,
         high=1000.0,
     )
@@ -143,7 +143,7 @@ class RefiningOptions:
     )
     principal_point_sigma_px: float = option(
         10.0,
-        "Standard deviation of the principal point to be refined, per axis [px of a picture 1920 px wide; scaled to the width].",
+        "Standard deviation of the principal point to be refined, per axis [px of an image 1920 px wide; scaled to the width].",
         low=0.0,
         high=1000.0,
     )

@@ -50,7 +50,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     (
         "markdown",
         "## How sure is it?\n\nThe covariance is of the pose error (dt, dtheta), in metres and radians. `pixel_sigma` carries "
-        "it to the picture: how far off a point may come out. The true pose lies within the stated uncertainty if the "
+        "it to the image: how far off a point may come out. The true pose lies within the stated uncertainty if the "
         "squared distance below is under the quantile.",
     ),
     (

@@ -95,7 +95,7 @@ def _assemble(folder: Path) -> None:
         ):
             text = text.replace(f"]({link}", f"]({target}")
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
-    for name in ("pictures", "schemas"):
+    for name in ("images", "schemas"):
         shutil.copytree(docs / name, folder / name)
     for name in ("CITATION.cff", "LICENSE", "pyproject.toml"):
         shutil.copy(_ROOT / name, folder / name)

@@ -10,7 +10,7 @@ export interface Stamp {
 /** The region around a reprojection that contains 95 % of the residuals of a good pair; written as an array. */
 export type Ellipse = [semi_major_px: number, semi_minor_px: number, angle_rad: number];
 
-/** One click: its mark on the picture and its row in the table. */
+/** One click: its mark on the image and its row in the table. */
 export interface ClickRow {
   id: string;
   image_time: Stamp;
@@ -405,7 +405,7 @@ export interface RecordingNote {
   image_topic: string;
   width_px: number;
   height_px: number;
-  has_pictures: boolean;
+  has_images: boolean;
   frame_times: StampColumns;
   start: Stamp;
   radar: StampColumns;
@@ -458,7 +458,7 @@ export interface Placements {
 /** One radar return; written as an array, since there are many. */
 export type RadarReturn = [u_px: number | null, v_px: number | null, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean, x_m: number, y_m: number, z_m: number, age_s: number, azimuth_deg: number, elevation_deg: number];
 
-/** The returns of the last seconds, for a recording without pictures. */
+/** The returns of the last seconds, for a recording without images. */
 export interface RadarLook {
   type: "radar_look";
   index: number;
@@ -677,7 +677,7 @@ export interface ContourMap {
   contours: Contour[];
 }
 
-/** Where points at several distances may appear in the picture. */
+/** Where points at several distances may appear in the image. */
 export interface Uncertainty {
   type: "uncertainty";
   revision: number;
@@ -708,7 +708,7 @@ export interface LensState {
   type: "lens";
   intrinsics: LensCamera | null;
   chosen: boolean;
-  pictures: number;
+  images: number;
   stage: "idle" | "searching" | "calibrating" | "cancelled" | "failed" | "done";
   searched: number;
   total: number;
@@ -731,8 +731,8 @@ export interface LensViewRow {
   held_out_rms_px: number;
 }
 
-/** A picture that is not used, and why. */
-export interface LeftOutPicture {
+/** An image that is not used, and why. */
+export interface LeftOutImage {
   index: number;
   name: string;
   reason: string;
@@ -756,8 +756,8 @@ export interface LensTrial {
   chosen: boolean;
 }
 
-/** Standard deviations over the picture. */
-export interface PictureGrid {
+/** Standard deviations over the image. */
+export interface ImageGrid {
   x_px: number[];
   y_px: number[];
   sigma_px: number[][];
@@ -773,12 +773,12 @@ export interface LensResult {
   rms_px: number;
   held_out_rms_px: number;
   views: LensViewRow[];
-  left_out: LeftOutPicture[];
+  left_out: LeftOutImage[];
   trials: LensTrial[];
   warnings: WarningRow[];
   residuals: [number, number, number, number][];
   pattern: string;
-  uncertainty: PictureGrid | null;
+  uncertainty: ImageGrid | null;
   unseen: string;
 }
 
@@ -791,13 +791,13 @@ export interface ProposingProgress {
   hint: string;
 }
 
-/** A place in the picture where the reflector may stand. */
+/** A place in the image where the reflector may stand. */
 export interface ProposalPlace {
   pixel_px: [number, number];
   sigma_px: number;
 }
 
-/** Where the reflector probably stands in the pictures of a placement. */
+/** Where the reflector probably stands in the images of a placement. */
 export interface ProposalRow {
   placement: number;
   frame: number;
@@ -854,7 +854,7 @@ export interface Done {
   request: number;
 }
 
-/** The header that precedes the bytes of a picture. */
+/** The header that precedes the bytes of an image. */
 export interface FrameHeader {
   index: number;
   request: number;
@@ -1026,7 +1026,7 @@ export interface ViewWanted {
   request?: number;
 }
 
-/** A page wants the picture of a frame; exactly one binary message answers, unless a newer request comes first. */
+/** A page wants the image of a frame; exactly one binary message answers, unless a newer request comes first. */
 export interface FrameWanted {
   type: "frame";
   index: number;
@@ -1088,7 +1088,7 @@ export interface CompareWanted {
   request?: number;
 }
 
-/** The contours of the uncertainty in the picture are requested. */
+/** The contours of the uncertainty in the image are requested. */
 export interface UncertaintyWanted {
   type: "uncertainty";
   request?: number;

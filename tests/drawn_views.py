@@ -1,4 +1,4 @@
-"""Dwell views drawn at random, without pictures: candidates with known truth, decoys, clutter that repeats itself, people."""
+"""Dwell views drawn at random, without images: candidates with known truth, decoys, clutter that repeats itself, people."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,7 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
-from calib_core.proposing import DwellView, PictureCandidate
+from calib_core.proposing import DwellView, ImageCandidate
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.synthetic.rig import nominal_rotation, typical_camera
 
@@ -45,7 +45,7 @@ class Drawing:
 
     Attributes:
         count: of dwells.
-        decoys: per dwell, anywhere in the picture.
+        decoys: per dwell, anywhere in the image.
         clutter: decoys per dwell that are at the same places in each.
         first_share: of the dwells whose strongest candidate is the reflector.
         listed_share: of the dwells whose candidates contain it at all.
@@ -90,11 +90,11 @@ def draw_views(seed: int, drawing: Drawing | None = None) -> DrawnViews:
     return DrawnViews(tuple(views), camera, camera_from_radar, pixels)
 
 
-def with_pictures_of(radar: DrawnViews, pictures: DrawnViews) -> tuple[DwellView, ...]:
-    """Return the radar's dwells of one recording with the pictures of another."""
+def with_images_of(radar: DrawnViews, images: DrawnViews) -> tuple[DwellView, ...]:
+    """Return the radar's dwells of one recording with the images of another."""
     return tuple(
         replace(view, placement=replace(other.placement, start=view.placement.start, end=view.placement.end))
-        for view, other in zip(pictures.views, radar.views, strict=False)
+        for view, other in zip(images.views, radar.views, strict=False)
     )
 
 
@@ -128,19 +128,19 @@ def _candidates(
     clutter: np.ndarray,
     point: np.ndarray,
     drawing: Drawing,
-) -> tuple[PictureCandidate, ...]:
+) -> tuple[ImageCandidate, ...]:
     size = [camera.width_px, camera.height_px]
     sigma_px = 0.05 * float(camera.matrix_px[0, 0]) / float(np.linalg.norm(point))
     places = [*rng.uniform([0, 0], size, (drawing.decoys, 2)), *(one + rng.normal(0.0, 1.0, 2) for one in clutter)]
     weaker = np.sort(rng.uniform(2.0, 12.0, len(places)))[::-1]
-    found = [PictureCandidate(at, sigma_px, strength) for at, strength in zip(places, weaker, strict=True)]
+    found = [ImageCandidate(at, sigma_px, strength) for at, strength in zip(places, weaker, strict=True)]
     if pixel is not None and rng.random() < drawing.listed_share:
         strength = rng.uniform(12.0, 20.0) if rng.random() < drawing.first_share else rng.uniform(4.0, 10.0)
-        found.append(PictureCandidate(pixel + sigma_px * rng.standard_normal(2), sigma_px, float(strength)))
+        found.append(ImageCandidate(pixel + sigma_px * rng.standard_normal(2), sigma_px, float(strength)))
     return tuple(sorted(found, key=lambda one: -one.strength))
 
 
-def _view(number: int, position_m: np.ndarray, snr_db: float, candidates: tuple[PictureCandidate, ...]) -> DwellView:
+def _view(number: int, position_m: np.ndarray, snr_db: float, candidates: tuple[ImageCandidate, ...]) -> DwellView:
     start = START_NS + number * PERIOD_NS
     middle = TimeNs(start + DWELL_NS // 2)
     placement = Placement(TimeNs(start), TimeNs(start + DWELL_NS), position_m, 0.9, snr_db)

@@ -1,4 +1,4 @@
-"""A recording of a person who walks along a street: pictures with a textured figure, and the radar's returns."""
+"""A recording of a person who walks along a street: images with a textured figure, and the radar's returns."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -10,13 +10,13 @@ import numpy as np
 from calib_core.interchange import read_calibration
 from calib_core.measurements import Box, RadarScans, TimeNs
 from cocalib.view import Reference
-from tests.picture_recording import PictureRecording
+from tests.image_recording import ImageRecording
 from tests.street import CAMERA, TRUE_POSE, street
 
 _GOLDEN = Path(__file__).parent / "golden" / "calibration-1.json"
 
 
-class StreetRecording(PictureRecording):
+class StreetRecording(ImageRecording):
     """One person, 10 Hz, with the true boxes as `street.boxes`."""
 
     def __init__(self, seconds: float = 4.0) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of hypotheses: one frame with the radar's returns where each meaning of a file's numbers puts them."""
+"""Images of hypotheses: one frame with the radar's returns where each meaning of a file's numbers puts them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ class FrameWithReturns:
     """A frame of a recording, and what the radar saw at that time.
 
     Attributes:
-        picture: uint8 (h, w, 3), blue first.
+        image: uint8 (h, w, 3), blue first.
         points_radar_m: (n, 3) the returns of the nearest scan; none if no scan is near.
-        camera: the intrinsics of the picture.
+        camera: the intrinsics of the image.
     """
 
-    picture: np.ndarray
+    image: np.ndarray
     points_radar_m: Points3
     camera: "Camera"
 
@@ -75,35 +75,35 @@ def frame_with_returns(recording: "Recording", camera: "Camera", index: int | No
     """Read a frame and the returns of the scan nearest to it.
 
     Args:
-        recording: with pictures and a radar.
-        camera: the intrinsics of its pictures.
+        recording: with images and a radar.
+        camera: the intrinsics of its images.
         index: of the frame; None takes the one in the middle.
 
     Raises:
-        InputError: the intrinsics are those of pictures of another size.
+        InputError: the intrinsics are those of images of another size.
         RecordingError: the frame cannot be read.
     """
     index = len(recording.image_times) // 2 if index is None else index
-    picture = recording.image(index)
-    if picture.shape[:2] != (camera.height_px, camera.width_px):
-        height_px, width_px = picture.shape[:2]
+    image = recording.image(index)
+    if image.shape[:2] != (camera.height_px, camera.width_px):
+        height_px, width_px = image.shape[:2]
         raise InputError(
-            f"{recording.name}: the pictures have {width_px} x {height_px} px, and the camera {camera.width_px} x "
-            f"{camera.height_px} px; give the intrinsics of these pictures with --camera FILE"
+            f"{recording.name}: the images have {width_px} x {height_px} px, and the camera {camera.width_px} x "
+            f"{camera.height_px} px; give the intrinsics of these images with --camera FILE"
         )
     time = TimeNs(int(recording.image_times[index]))
     scans = recording.radar_scans_around([time], _WITHIN_S)
     points_radar_m = scans.scan(scans.nearest(time)).points_radar_m if len(scans) else np.zeros((0, 3))
-    return FrameWithReturns(picture, points_radar_m[np.isfinite(points_radar_m).all(axis=1)], camera)
+    return FrameWithReturns(image, points_radar_m[np.isfinite(points_radar_m).all(axis=1)], camera)
 
 
 def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TILE_WIDTH_PX) -> np.ndarray:
     """Draw the returns of a frame where a hypothesis puts them, nearer ones larger and warmer; uint8 (h, w, 3)."""
     import cv2
 
-    scale = width_px / frame.picture.shape[1]
-    height_px = max(1, round(frame.picture.shape[0] * scale))
-    drawn = cv2.resize(frame.picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    scale = width_px / frame.image.shape[1]
+    height_px = max(1, round(frame.image.shape[0] * scale))
+    drawn = cv2.resize(frame.image, (width_px, height_px), interpolation=cv2.INTER_AREA)
     for (u_px, v_px), range_m in _seen(frame, hypothesis):
         nearness = float(np.clip(np.log(_FAR_M / range_m) / np.log(_FAR_M / _NEAR_M), 0.0, 1.0))
         at = round((u_px + 0.5) * scale), round((v_px + 0.5) * scale)
@@ -114,13 +114,13 @@ def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TIL
     return np.asarray(drawn)
 
 
-def returns_in_picture(frame: FrameWithReturns, hypothesis: "Hypothesis") -> str:
-    """Return how many of the returns a hypothesis puts into the picture."""
-    return f"{len(_seen(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the picture"
+def returns_in_image(frame: FrameWithReturns, hypothesis: "Hypothesis") -> str:
+    """Return how many of the returns a hypothesis puts into the image."""
+    return f"{len(_seen(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the image"
 
 
 def _seen(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple[float, float], float]]:
-    """Return the pixel and the range of each return that is in the picture."""
+    """Return the pixel and the range of each return that is in the image."""
     if not len(frame.points_radar_m):
         return []
     points_camera_m = hypothesis.camera_from_radar @ frame.points_radar_m
@@ -145,22 +145,22 @@ def _caption(frame: FrameWithReturns, number: int, one: "Hypothesis") -> np.ndar
     import cv2
 
     strip = np.full((_CAPTION_PX, _TILE_WIDTH_PX, 3), _PAPER, np.uint8)
-    lines = (f"{number}: {one.key}", f"{one.score}; {returns_in_picture(frame, one)}", one.mounting)
+    lines = (f"{number}: {one.key}", f"{one.score}; {returns_in_image(frame, one)}", one.mounting)
     for row, line in enumerate(lines):
         at = 6, 15 + row * _LINE_PX
         cv2.putText(strip, line[:100], at, cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
     return strip
 
 
-def png(picture: np.ndarray) -> bytes:
-    """Return a picture as a PNG file of ours."""
+def png(image: np.ndarray) -> bytes:
+    """Return an image as a PNG file of ours."""
     import cv2
 
-    return tagged_png(bytes(cv2.imencode(".png", picture)[1]))
+    return tagged_png(bytes(cv2.imencode(".png", image)[1]))
 
 
-def jpeg(picture: np.ndarray) -> bytes:
-    """Return a picture as a JPEG file."""
+def jpeg(image: np.ndarray) -> bytes:
+    """Return an image as a JPEG file."""
     import cv2
 
-    return bytes(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])
+    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])

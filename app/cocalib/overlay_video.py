@@ -120,7 +120,7 @@ class Panels:
             view: what to draw.
             titles: of the panels: one, or two with another calibration.
             trail_scans: number of earlier scans whose returns stay.
-            size_px: width and height of the recorded pictures.
+            size_px: width and height of the recorded images.
         """
         width, height = size_px
         strip_px = _footer_height_px(height)
@@ -138,21 +138,21 @@ class Panels:
         """Project the returns around the frames that follow."""
         self._seen = [seen_in(calibration, block.scans) for calibration in self._calibrations]
 
-    def compose(self, picture: np.ndarray, time: TimeNs) -> np.ndarray:
+    def compose(self, image: np.ndarray, time: TimeNs) -> np.ndarray:
         """Return a frame of the video.
 
         Args:
-            picture: uint8 (h, w, 3), blue first, of the size given.
+            image: uint8 (h, w, 3), blue first, of the size given.
             time: its stamp.
         """
         width, height = self.video_size_px
         frame = np.zeros((height, width, 3), np.uint8)
-        rows, columns = picture.shape[:2]
+        rows, columns = image.shape[:2]
         for place, (calibration, seen, strip) in enumerate(
             zip(self._calibrations, self._seen, self._strips, strict=True)
         ):
             own = slice(place * columns, (place + 1) * columns)
-            panel = np.ascontiguousarray(picture)
+            panel = np.ascontiguousarray(image)
             if place + 1 < len(self._calibrations):
                 panel = panel.copy()
             self._draw(panel, calibration, seen, time)
@@ -193,10 +193,10 @@ class Panels:
         return words
 
 
-def _footer_height_px(picture_height_px: int) -> int:
-    """Return how high the strip is below a picture, so that both together have an even height."""
-    height = max(30, round(0.055 * picture_height_px))
-    return height + (picture_height_px + height) % 2
+def _footer_height_px(image_height_px: int) -> int:
+    """Return how high the strip is below an image, so that both together have an even height."""
+    height = max(30, round(0.055 * image_height_px))
+    return height + (image_height_px + height) % 2
 
 
 def time_text(time: TimeNs, start: TimeNs) -> str:
@@ -261,51 +261,51 @@ def _legend(strip: np.ndarray, colours: ReturnColours) -> float:
     return float(low_px - letters)
 
 
-def _text_height_px(picture: np.ndarray) -> float:
-    """Return the height of capital letters that suits the picture."""
-    return 12.0 * max(0.75, picture.shape[0] / _REFERENCE_HEIGHT_PX)
+def _text_height_px(image: np.ndarray) -> float:
+    """Return the height of capital letters that suits the image."""
+    return 12.0 * max(0.75, image.shape[0] / _REFERENCE_HEIGHT_PX)
 
 
-def draw_returns(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, still: Flags) -> None:
+def draw_returns(image: np.ndarray, pixels_px: Points2, colours: np.ndarray, still: Flags) -> None:
     """Draw returns in their colours: dots are static, triangles are moving, as on the page.
 
     Args:
-        picture: uint8 (h, w, 3), blue first; changed.
+        image: uint8 (h, w, 3), blue first; changed.
         pixels_px: (n, 2).
         colours: (n, 3), red first.
         still: (n,) which are static.
     """
-    size = 0.4 * _text_height_px(picture)
+    size = 0.4 * _text_height_px(image)
     smooth = cv2.LINE_AA if len(pixels_px) < _MANY else cv2.LINE_8
     blue_first = colours[:, ::-1].tolist()
     for (u_px, v_px), colour, stays in zip(pixels_px.tolist(), blue_first, still.tolist(), strict=True):
         if stays:
             centre = _fixed(u_px, v_px)
-            cv2.circle(picture, centre, round((size + 1.2) * (1 << _SHIFT)), _EDGE, -1, smooth, _SHIFT)
-            cv2.circle(picture, centre, round(size * (1 << _SHIFT)), colour, -1, smooth, _SHIFT)
+            cv2.circle(image, centre, round((size + 1.2) * (1 << _SHIFT)), _EDGE, -1, smooth, _SHIFT)
+            cv2.circle(image, centre, round(size * (1 << _SHIFT)), colour, -1, smooth, _SHIFT)
         else:
-            _triangle(picture, u_px, v_px, 1.3 * size + 1.6, _EDGE, smooth)
-            _triangle(picture, u_px, v_px, 1.3 * size, colour, smooth)
+            _triangle(image, u_px, v_px, 1.3 * size + 1.6, _EDGE, smooth)
+            _triangle(image, u_px, v_px, 1.3 * size, colour, smooth)
 
 
-def _draw_trail(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, ages: np.ndarray) -> None:
+def _draw_trail(image: np.ndarray, pixels_px: Points2, colours: np.ndarray, ages: np.ndarray) -> None:
     """Draw earlier returns as dots that become smaller with age.
 
     Args:
-        picture: uint8 (h, w, 3), blue first; changed.
+        image: uint8 (h, w, 3), blue first; changed.
         pixels_px: (n, 2).
         colours: (n, 3), red first.
         ages: (n,) 0 for the newest, 1 for the oldest.
     """
-    radii = 0.3 * _text_height_px(picture) * (1.0 - 0.75 * ages)
+    radii = 0.3 * _text_height_px(image) * (1.0 - 0.75 * ages)
     rows = zip(pixels_px.tolist(), colours[:, ::-1].tolist(), radii.tolist(), strict=True)
     for (u_px, v_px), colour, radius_px in rows:
-        cv2.circle(picture, _fixed(u_px, v_px), round(radius_px * (1 << _SHIFT)), colour, -1, cv2.LINE_8, _SHIFT)
+        cv2.circle(image, _fixed(u_px, v_px), round(radius_px * (1 << _SHIFT)), colour, -1, cv2.LINE_8, _SHIFT)
 
 
-def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, ids: Sequence[str]) -> None:
+def draw_clicks(image: np.ndarray, clicks_px: Points2, projected_px: Points2, ids: Sequence[str]) -> None:
     """Draw clicks as crosses, their reprojections as rings, and the residuals between them, with their lengths."""
-    size = _text_height_px(picture)
+    size = _text_height_px(image)
     lengths_px = np.linalg.norm(projected_px - clicks_px, axis=1)
     colours = residual_colours(lengths_px, LARGE_PX)[:, ::-1].tolist()
     rows = zip(clicks_px.tolist(), projected_px.tolist(), ids, lengths_px.tolist(), colours, strict=True)
@@ -313,32 +313,32 @@ def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, 
         (u_px, v_px), seen = click, bool(np.isfinite(projected).all())
         for (left, top), (right, bottom) in (((-1, 0), (1, 0)), ((0, -1), (0, 1))):
             ends = (_fixed(u_px + left * size, v_px + top * size), _fixed(u_px + right * size, v_px + bottom * size))
-            cv2.line(picture, *ends, _EDGE, 3, cv2.LINE_AA, _SHIFT)
-            cv2.line(picture, *ends, _WHITE, 1, cv2.LINE_AA, _SHIFT)
+            cv2.line(image, *ends, _EDGE, 3, cv2.LINE_AA, _SHIFT)
+            cv2.line(image, *ends, _WHITE, 1, cv2.LINE_AA, _SHIFT)
         if seen:
-            cv2.line(picture, _fixed(u_px, v_px), _fixed(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
-            cv2.circle(picture, _fixed(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT)
+            cv2.line(image, _fixed(u_px, v_px), _fixed(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
+            cv2.circle(image, _fixed(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT)
         words = f"{name}: {length_px:.1f} px" if seen else f"{name}: behind the camera"
         width = _label_width_px(words, size)
-        fits = u_px + 1.8 * size + width < picture.shape[1]
+        fits = u_px + 1.8 * size + width < image.shape[1]
         left = u_px + 1.8 * size if fits else u_px - 1.8 * size - width
-        label(picture, words, (left, v_px - 0.9 * size), _WHITE, plate=True)
+        label(image, words, (left, v_px - 0.9 * size), _WHITE, plate=True)
 
 
-def draw_boxes(picture: np.ndarray, boxes: Sequence[Box], labels: Sequence[str]) -> None:
+def draw_boxes(image: np.ndarray, boxes: Sequence[Box], labels: Sequence[str]) -> None:
     """Draw boxes with their classes and tracks, one colour per class."""
     for box in boxes:
         hue = _HUES[labels.index(box.label) % len(_HUES)][::-1] if box.label in labels else _WHITE
         corners = (_fixed(box.left_px, box.top_px), _fixed(box.right_px, box.bottom_px))
-        cv2.rectangle(picture, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
-        cv2.rectangle(picture, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
+        cv2.rectangle(image, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
+        cv2.rectangle(image, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
         words = box_words(box)
         if words:
-            label(picture, words, (box.left_px, box.top_px - 0.6 * _text_height_px(picture)), hue, plate=True)
+            label(image, words, (box.left_px, box.top_px - 0.6 * _text_height_px(image)), hue, plate=True)
 
 
 def label(
-    picture: np.ndarray,
+    image: np.ndarray,
     words: str,
     place_px: tuple[float, float],
     colour: tuple[int, int, int],
@@ -346,26 +346,26 @@ def label(
     *,
     plate: bool = False,
 ) -> float:
-    """Write one line inside the picture; return its width [px].
+    """Write one line inside the image; return its width [px].
 
     Args:
-        picture: changed.
+        image: changed.
         words: to write; what the font does not have becomes a question mark.
         place_px: of the left end of the base line.
         colour: blue first.
         height_px: of capital letters.
-        plate: darken what is behind the line, so that it can be read on any picture.
+        plate: darken what is behind the line, so that it can be read on any image.
     """
-    height_px = _text_height_px(picture) if height_px is None else height_px
+    height_px = _text_height_px(image) if height_px is None else height_px
     plain, scale, width = _measured(words, height_px)
-    u_px = min(max(place_px[0], 2.0), max(2.0, picture.shape[1] - width - 2.0))
-    v_px = min(max(place_px[1], 1.5 * height_px), picture.shape[0] - 0.5 * height_px)
+    u_px = min(max(place_px[0], 2.0), max(2.0, image.shape[1] - width - 2.0))
+    v_px = min(max(place_px[1], 1.5 * height_px), image.shape[0] - 0.5 * height_px)
     if plate:
         margin = round(0.4 * height_px)
         top, bottom = max(0, round(v_px - height_px) - margin), round(v_px) + margin
-        behind = picture[top:bottom, max(0, round(u_px) - margin) : round(u_px + width) + margin]
+        behind = image[top:bottom, max(0, round(u_px) - margin) : round(u_px + width) + margin]
         behind[:] = behind // 4
-    cv2.putText(picture, plain, (round(u_px), round(v_px)), _FONT, scale, colour, 1, cv2.LINE_AA)
+    cv2.putText(image, plain, (round(u_px), round(v_px)), _FONT, scale, colour, 1, cv2.LINE_AA)
     return width
 
 
@@ -381,9 +381,9 @@ def _measured(words: str, height_px: float) -> tuple[str, float, float]:
     return plain, scale, float(cv2.getTextSize(plain, _FONT, scale, 1)[0][0])
 
 
-def _triangle(picture: np.ndarray, u_px: float, v_px: float, size: float, colour: Sequence[int], smooth: int) -> None:
+def _triangle(image: np.ndarray, u_px: float, v_px: float, size: float, colour: Sequence[int], smooth: int) -> None:
     corners = [(u_px, v_px - size), (u_px + 0.9 * size, v_px + 0.7 * size), (u_px - 0.9 * size, v_px + 0.7 * size)]
-    cv2.fillConvexPoly(picture, np.array([_fixed(*corner) for corner in corners]), colour, smooth, _SHIFT)
+    cv2.fillConvexPoly(image, np.array([_fixed(*corner) for corner in corners]), colour, smooth, _SHIFT)
 
 
 def _fixed(u_px: float, v_px: float) -> tuple[int, int]:
@@ -401,8 +401,8 @@ def _write(
     rate = (len(times) - 1) / duration_s if duration_s > 0 else 1.0
     skipped, count, last = SkippedFrames(), 0, TimeNs(int(times[0]))
     with encoding(path, panels.video_size_px, rate) as encoder:
-        for time, picture in _pictures(view, panels, skipped, size_px, options, progress):
-            encoder.add(panels.compose(picture, time), time)
+        for time, image in _images(view, panels, skipped, size_px, options, progress):
+            encoder.add(panels.compose(image, time), time)
             count, last = count + 1, time
         if encoder.start is None:
             raise RecordingError(
@@ -414,7 +414,7 @@ def _write(
     return WrittenOverlay(video, codec, panels.video_size_px)
 
 
-def _pictures(
+def _images(
     view: RecordedView,
     panels: Panels,
     skipped: SkippedFrames,
@@ -430,14 +430,14 @@ def _pictures(
             if progress:
                 progress(block.first + place, total)
             try:
-                picture = recording.image(block.first + place)
+                image = recording.image(block.first + place)
             except MessageError as error:
                 skipped.add_unreadable(error)
                 continue
-            if (picture.shape[1], picture.shape[0]) != size_px:
+            if (image.shape[1], image.shape[0]) != size_px:
                 skipped.other_size += 1
                 continue
-            yield TimeNs(time), picture
+            yield TimeNs(time), image
 
 
 @dataclass(slots=True)
@@ -454,18 +454,18 @@ class _Encoder:
     start: TimeNs | None = None
     ticks: int = -1
 
-    def add(self, picture: np.ndarray, time: TimeNs) -> None:
+    def add(self, image: np.ndarray, time: TimeNs) -> None:
         """Append a frame.
 
         Args:
-            picture: uint8 (h, w, 3), blue first, of the size given.
+            image: uint8 (h, w, 3), blue first, of the size given.
             time: its stamp.
         """
         import av
 
         self.start = time if self.start is None else self.start
         self.ticks = max(self.ticks + 1, round((time - self.start) * _TICKS_PER_S / NS_PER_S))
-        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        frame = av.VideoFrame.from_ndarray(image, format="bgr24")
         frame = frame.reformat(format=self.stream.pix_fmt, dst_colorspace="ITU709")
         frame.pts, frame.time_base = self.ticks, Fraction(1, _TICKS_PER_S)
         self.container.mux(self.stream.encode(frame))

@@ -1,4 +1,4 @@
-"""From a recording to proposals: placements, what the pictures show there, how the two fit; and the same in the background."""
+"""From a recording to proposals: placements, what the images show there, how the two fit; and the same in the background."""
 
 import logging
 import threading
@@ -53,7 +53,7 @@ def find_proposals(
     progress: Callable[[ViewProgress | str], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[tuple[DwellView, ...], Proposals] | Unsolvable:
-    """Find where the reflector stood, and where the pictures show it there.
+    """Find where the reflector stood, and where the images show it there.
 
     Args:
         recording: with a radar and a camera.
@@ -62,7 +62,7 @@ def find_proposals(
         confirmed: clicks that a person placed or accepted; each shows what the reflector looks like.
         placements: where the radar saw something stand still, if that is known already.
         reflector_m: width of the reflector [m].
-        progress: called with what is done next, in words, and while the pictures are looked at.
+        progress: called with what is done next, in words, and while the images are looked at.
         stopped: asked often; once it is true there are no proposals.
 
     Raises:
@@ -238,7 +238,7 @@ class ProposingProgress:
 
     Attributes:
         stage: what is being done.
-        done: placements whose pictures were looked at, or compared with what was clicked.
+        done: placements whose images were looked at, or compared with what was clicked.
         count: of all.
         problem: why there are no proposals, if the stage is "failed".
         hint: what to do about it.
@@ -268,7 +268,7 @@ class ProposingSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class _Patient:
-    """A recording whose pictures are decoded when nothing more urgent is going on."""
+    """A recording whose images are decoded when nothing more urgent is going on."""
 
     recording: RecordedFrames
     wait: Callable[[], None]
@@ -296,7 +296,7 @@ class ProposingJob:
         Args:
             recording: with a radar and a camera.
             changed: called after every change, without any lock held.
-            wait: called before each picture and each proposing; returns when nothing more urgent is going on.
+            wait: called before each image and each proposing; returns when nothing more urgent is going on.
         """
         self._recording = _Patient(recording, wait)
         self._wait = wait
@@ -319,7 +319,7 @@ class ProposingJob:
         return self._snapshot
 
     def ask(self, wish: ProposingWish) -> None:
-        """Propose for this wish instead of the last one; returns immediately. Pictures are not looked at again in vain."""
+        """Propose for this wish instead of the last one; returns immediately. Images are not looked at again in vain."""
         with self._news:
             if self._closed:
                 return
@@ -360,8 +360,8 @@ class ProposingJob:
                     self._failed(str(error))
 
     def _answer(self, wish: ProposingWish) -> None:
-        """Look at the pictures unless that is done; then propose, and carry what was clicked."""
-        if self._seen_for is None or not _same_pictures(self._seen_for, wish):
+        """Look at the images unless that is done; then propose, and carry what was clicked."""
+        if self._seen_for is None or not _same_images(self._seen_for, wish):
             self._set(wish, stage="looking", done=0, count=len(wish.placements), problem="", hint="")
             found = find_proposals(
                 self._recording,
@@ -434,9 +434,9 @@ class ProposingJob:
         self._set(wish, found, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:
-        """Whether looking at the pictures for this wish serves the newest one, too."""
+        """Whether looking at the images for this wish serves the newest one, too."""
         newest = self._wish
-        return not self._closed and newest is not None and _same_pictures(newest, wish)
+        return not self._closed and newest is not None and _same_images(newest, wish)
 
     def _failed(self, line: str) -> None:
         _log.warning("nothing could be proposed: %s", line)
@@ -463,6 +463,6 @@ class ProposingJob:
         self._changed()
 
 
-def _same_pictures(one: ProposingWish, other: ProposingWish) -> bool:
+def _same_images(one: ProposingWish, other: ProposingWish) -> bool:
     """Return whether two wishes need the same placements looked at with the same camera."""
     return one.camera is other.camera and one.placements is other.placements

@@ -232,7 +232,7 @@ def recorded_view(
         progress: of the evaluation.
 
     Raises:
-        InputError: there are no scans, or the pictures are not those of the calibration's camera.
+        InputError: there are no scans, or the images are not those of the calibration's camera.
     """
     if not len(recording.radar_times):
         raise InputError(f"{recording.name}: {recording.radar_topic} has no scans; choose another with --radar-topic")
@@ -270,9 +270,9 @@ def _own_pairs(recording: Recording, calibration: Calibration) -> tuple[PairResu
 
 
 def _require_same_size(recording: Recording, calibration: Calibration) -> None:
-    picture, camera = recording.image_bytes(0), calibration.camera
-    if (picture.width_px, picture.height_px) != (camera.width_px, camera.height_px):
+    image, camera = recording.image_bytes(0), calibration.camera
+    if (image.width_px, image.height_px) != (camera.width_px, camera.height_px):
         raise InputError(
-            f"{recording.name}: its pictures have {picture.width_px} x {picture.height_px} px, but the calibration's camera has "
+            f"{recording.name}: its images have {image.width_px} x {image.height_px} px, but the calibration's camera has "
             f"{camera.width_px} x {camera.height_px} px; give a calibration of this camera, or other topics"
         )

@@ -52,7 +52,7 @@ class Journal(Protocol):
 
 
 class _Unstored:
-    """Stores nothing: changes of options while looking at a recording without pictures are not kept."""
+    """Stores nothing: changes of options while looking at a recording without images are not kept."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -329,13 +329,13 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         InputError: it has neither frames nor radar scans.
     """
     if not len(recording.image_times) and not len(recording.radar_times):
-        raise InputError(f"{name}: has neither pictures nor radar scans; give the files of the radar and of the camera")
-    picture = recording.image_bytes(0) if len(recording.image_times) else None
+        raise InputError(f"{name}: has neither images nor radar scans; give the files of the radar and of the camera")
+    image = recording.image_bytes(0) if len(recording.image_times) else None
     return RecordingFacts(
         name,
         recording.image_times,
-        picture.width_px if picture else 0,
-        picture.height_px if picture else 0,
+        image.width_px if image else 0,
+        image.height_px if image else 0,
         recording.radar_axes,
         recording.radar_times,
         recording.radar_topics,
@@ -366,14 +366,14 @@ def open_workspace(
         camera_file: the file that the intrinsics come from; None for the recording's own.
         intrinsics: where they come from, in words; by default, that file or the recording's topic.
 
-    Without pictures there is nothing to click and nothing to store: the session folder is not touched.
+    Without images there is nothing to click and nothing to store: the session folder is not touched.
 
     Raises:
         InputError: the recording has neither frames nor radar scans.
         SessionFileError: the session cannot be opened.
     """
     facts = recording_facts(recording, name)
-    if not facts.has_pictures:
+    if not facts.has_images:
         nothing = _Unstored(session_folder)
         return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)

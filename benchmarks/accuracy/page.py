@@ -21,8 +21,8 @@ Written by `COMMAND`; do not edit.
 - **The radar decides the angles:** about half a degree with an imaging radar, about one degree with a TI radar, several with a
   TI radar in a narrow aisle, where the verdict says coarse.
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
-  alike, a cropped picture. The verdict says that it assumes none of them. A measured position shows the first two; a turn, such
-  as that of a cropped picture, it shows with an imaging radar only.
+  alike, a cropped image. The verdict says that it assumes none of them. A measured position shows the first two; a turn, such
+  as that of a cropped image, it shows with an imaging radar only.
 - An answer that is far off, calls itself good or usable and names no cause is *silently wrong*. The tables count them.
 
 ## How it was measured
@@ -36,7 +36,7 @@ the same.
 Noise levels are assumptions based on
 vendors' figures; no real radar was measured. `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
 `ti_aisle` the same in a narrow aisle (2 cm, 0.8, 2), `ti_fine` with interpolated peaks (0.8 cm, 0.2, 0.7), `imaging` an imaging
-radar (3 cm, 0.12, 0.25); clicks have 2 px of noise in a 1920 x 1080 picture with a field of view of 75 deg. The field scene
+radar (3 cm, 0.12, 0.25); clicks have 2 px of noise in a 1920 x 1080 image with a field of view of 75 deg. The field scene
 extends from 2 to 20 m, the aisle is 2.4 m wide and 15 m long.
 
 The figure after ± is two standard errors. "Met": the figure reaches the aim. "Undecided": it does not, but by less than two

@@ -115,7 +115,7 @@ def _figures(
         outcome: of the solve.
         truth: the true pose of the axes in which the radar reports.
         points_radar_m: (n, 3) positions without noise.
-        pixels_px: (n, 2) where they are in the picture.
+        pixels_px: (n, 2) where they are in the image.
         reported: whether these are positions with the radar's errors; otherwise true ones.
     """
     figures: Figures = {"level": float(_LEVELS.index(verdict_on(outcome).level))}
@@ -131,10 +131,10 @@ def _figures(
     return figures | {
         "rotation_deg": rotation_deg,
         "position_cm": 100.0 * float(np.linalg.norm(away_m)),
-        "picture_px": float(np.linalg.norm(projected_px[0] - pixels_px[place])),
+        "image_px": float(np.linalg.norm(projected_px[0] - pixels_px[place])),
         "stated_deg": stated.rotation_deg,
         "stated_cm": stated.position_cm if np.isfinite(stated.position_cm) else None,
-        "stated_px": stated.picture_px,
+        "stated_px": stated.image_px,
     }
 
 
@@ -155,7 +155,7 @@ def share_inside(trials: Sequence[Figures], levels: Sequence[VerdictLevel]) -> n
     """Flag the trials of these levels whose errors are all inside what the sentence states."""
     wanted = [_LEVELS.index(level) for level in levels]
     judged = [one for one in trials if one["level"] in wanted]
-    names = (("rotation_deg", "stated_deg"), ("position_cm", "stated_cm"), ("picture_px", "stated_px"))
+    names = (("rotation_deg", "stated_deg"), ("position_cm", "stated_cm"), ("image_px", "stated_px"))
     parts = [
         np.isnan(column(judged, stated)) | (column(judged, error) <= column(judged, stated)) for error, stated in names
     ]

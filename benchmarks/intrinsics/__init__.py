@@ -1,1 +1,1 @@
-"""How well a lens is calibrated from pictures of a board, on draws that nobody chose."""
+"""How well a lens is calibrated from images of a board, on draws that nobody chose."""

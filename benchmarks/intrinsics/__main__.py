@@ -22,7 +22,7 @@ _HEAD = """# Accuracy of calibrated lenses
 Written by `python -m benchmarks.intrinsics`; do not edit. The draws come from the hash of the commit that each section
 names, so that nobody has seen them before. The cameras have 1280 x 720 pixels, focal lengths, principal points and
 distortion about the usual ones of each lens model; the board has 9 x 6 corners and squares of 22.14 mm, and is held tilted
-by up to 45 deg all over the picture, of which its corners cover about 60 %. "Blur and noise" is a blur of 0.7 px and noise
+by up to 45 deg all over the image, of which its corners cover about 60 %. "Blur and noise" is a blur of 0.7 px and noise
 of 2 grey levels; the bent board, the changing light (brightness 0.5 to 1.15, gradients of up to 40 %, vignetting of 40 %)
 and the rolling shutter (20 ms, a board that drifts at 3 cm/s and 5 deg/s) have them too. The bend is 1.5 mm along the rows
 and 0.7 mm along the columns. The aims: corners within 0.03 px and the focal length within 0.1 % with blur and noise, stated

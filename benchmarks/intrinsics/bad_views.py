@@ -4,37 +4,37 @@ import cv2
 import numpy as np
 
 from benchmarks.boards import render_board
-from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, Pictures, drawn_series
+from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, Images, drawn_series
 from benchmarks.intrinsics.tables import Table
 from calib_core.intrinsics import Board, BoardSearch, CalibratedLens, calibrate_lens, search_boards
 from calib_core.synthetic.boards import waved_poses
 
-__all__ = ["bad_view_table", "planted", "used_pictures"]
+__all__ = ["bad_view_table", "planted", "used_images"]
 
 _OTHER = Board("checkerboard", 7, 5, 0.028)
 _BLUR_PX = 5.0
 
 
-def planted(seed: list[int], views: int = 20) -> tuple[Pictures, dict[int, str]]:
-    """Return good pictures with bad ones after them, and what is wrong with those, by number."""
+def planted(seed: list[int], views: int = 20) -> tuple[Images, dict[int, str]]:
+    """Return good images with bad ones after them, and what is wrong with those, by number."""
     film = FILMS["blur and noise"]
     series = drawn_series(seed, "plumb_bob", film, views=views)
     rng = np.random.default_rng([*seed, 3])
-    good = series.pictures.pixels
+    good = series.images.pixels
     extra: list[tuple[str, np.ndarray]] = [
         ("blurred", cv2.GaussianBlur(good[i], (0, 0), _BLUR_PX)) for i in rng.choice(len(good), 3, replace=False)
     ]
     extra.append(("mirrored", np.ascontiguousarray(good[int(rng.integers(len(good)))][:, ::-1])))
     pose = waved_poses(rng, _OTHER, series.camera, 1)[0]
     extra.append(("another board", render_board(_OTHER, series.camera, pose, film, seed=int(rng.integers(1 << 31)))))
-    names = (*series.pictures.names, *(name for name, _ in extra))
+    names = (*series.images.names, *(name for name, _ in extra))
     bad = {len(good) + i: name for i, (name, _) in enumerate(extra)}
-    return Pictures((*good, *(picture for _, picture in extra)), names), bad
+    return Images((*good, *(image for _, image in extra)), names), bad
 
 
-def used_pictures(pictures: Pictures) -> tuple[set[int], set[int]]:
-    """Return the numbers of the pictures that are used, and of those that are left out with a reason."""
-    search = search_boards(pictures, CHECKERBOARD)
+def used_images(images: Images) -> tuple[set[int], set[int]]:
+    """Return the numbers of the images that are used, and of those that are left out with a reason."""
+    search = search_boards(images, CHECKERBOARD)
     if not isinstance(search, BoardSearch):
         return set(), set()
     lens = calibrate_lens(search)
@@ -48,9 +48,9 @@ def bad_view_table(first: int, draws: int) -> Table:
     counts: dict[str, list[int]] = {}
     good = [0, 0, 0]
     for i in range(draws):
-        pictures, bad = planted([first + i, 70])
-        used, named = used_pictures(pictures)
-        for number in range(len(pictures)):
+        images, bad = planted([first + i, 70])
+        used, named = used_images(images)
+        for number in range(len(images)):
             tally = counts.setdefault(bad[number], [0, 0, 0]) if number in bad else good
             tally[0] += 1
             tally[1] += number in used
@@ -58,7 +58,7 @@ def bad_view_table(first: int, draws: int) -> Table:
     rows = [("good", good), *counts.items()]
     cells = tuple((name, str(total), str(used), str(named)) for name, (total, used, named) in rows)
     note = (
-        "Each draw has 20 good pictures (blur 0.7 px, noise of 2 grey levels), three of them again with a blur of "
+        "Each draw has 20 good images (blur 0.7 px, noise of 2 grey levels), three of them again with a blur of "
         f"{_BLUR_PX:g} px, one mirrored, and one of a board of 7 x 5 corners."
     )
-    return Table("Planted bad views", ("picture", "shown", "used", "left out with a reason"), cells, note)
+    return Table("Planted bad views", ("image", "shown", "used", "left out with a reason"), cells, note)

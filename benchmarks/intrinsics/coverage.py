@@ -1,4 +1,4 @@
-"""Whether the stated sigmas hold: Monte Carlo with corners instead of pictures."""
+"""Whether the stated sigmas hold: Monte Carlo with corners instead of images."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.boards import BoardFilm, true_corners
-from benchmarks.intrinsics.draws import CHECKERBOARD, LENSES, Pictures, Series, drawn_camera, moved
+from benchmarks.intrinsics.draws import CHECKERBOARD, LENSES, Images, Series, drawn_camera, moved
 from benchmarks.intrinsics.rendered import scaled_errors
 from benchmarks.intrinsics.tables import Table
 from calib_core.arrays import Points2
 from calib_core.camera import Camera, CameraModel
 from calib_core.intrinsics import BoardCorners, BoardSearch, CalibratedLens, calibrate_lens
-from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance
+from calib_core.intrinsics.image_maps import far_point_slopes, found_pixels, grid_covariance
 from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["CASES", "Case", "coverage", "drawn_search", "sigma_table"]
@@ -20,7 +20,7 @@ __all__ = ["CASES", "Case", "coverage", "drawn_search", "sigma_table"]
 _CHI2_95 = 5.991
 """With two degrees of freedom."""
 _SHARED_OVER = 0.3
-"""Distance over which neighbours share an error, as a share of the board's diagonal in the picture."""
+"""Distance over which neighbours share an error, as a share of the board's diagonal in the image."""
 _GROSS_PX = 10.0
 
 
@@ -88,7 +88,7 @@ def drawn_search(seed: Sequence[int], model: CameraModel, case: Case, views: int
         ids = np.flatnonzero(camera.in_image(pixels))
         found.append(BoardCorners(index, f"view {index + 1}", None, size_px, ids, pixels[ids]))
     search = BoardSearch(CHECKERBOARD, size_px, tuple(found), (), views)
-    return Series(camera, CHECKERBOARD, Pictures((), ()), ()), search
+    return Series(camera, CHECKERBOARD, Images((), ()), ()), search
 
 
 def coverage(first: int, draws: int, lens: CameraModel, case: Case, number: int) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ def coverage(first: int, draws: int, lens: CameraModel, case: Case, number: int)
 
 
 def _projected_within(lens: CalibratedLens, true: Camera) -> float:
-    """Return the share of places of the picture where the projection of a far point is within its 95 % ellipse."""
+    """Return the share of places of the image where the projection of a far point is within its 95 % ellipse."""
     camera, found = lens.camera, found_pixels(lens)
     u, v = np.meshgrid(*(np.linspace(0.25, 0.75, 3) * size for size in (camera.width_px, camera.height_px)))
     places = np.stack([u.ravel(), v.ravel()], axis=1)
@@ -153,9 +153,9 @@ def sigma_table(first: int, draws: int, corners: str | None = None) -> Table:
     )
     head = (*head, "worst parameter", "best parameter", "standard error of one", "projection within its 95 % ellipse")
     note = (
-        "Corners without pictures: 20 views, another lens, other poses and other errors in each draw. The aim is 93 to 97 % "
+        "Corners without images: 20 views, another lens, other poses and other errors in each draw. The aim is 93 to 97 % "
         "for each parameter; a right sigma gives 95 %. The model is told except where the row says that it is chosen. The last "
-        "column looks at nine places in the inner half of the picture; the coefficients of a rational lens compensate each "
+        "column looks at nine places in the inner half of the image; the coefficients of a rational lens compensate each "
         "other, so that its projection is known where they are not."
     )
     return Table("Stated sigmas", head, cells, note)

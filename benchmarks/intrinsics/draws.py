@@ -1,4 +1,4 @@
-"""What the rows draw: lenses, boards, ways of filming, and pictures."""
+"""What the rows draw: lenses, boards, ways of filming, and images."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
 
-__all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Pictures", "Series", "drawn_camera", "drawn_series", "moved"]
+__all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Images", "Series", "drawn_camera", "drawn_series", "moved"]
 
 LENSES: tuple[CameraModel, ...] = ("pinhole", "plumb_bob", "rational_polynomial", "equidistant")
 CHECKERBOARD = Board("checkerboard", 9, 6, 0.02214)
@@ -35,8 +35,8 @@ _SPEED_MPS, _TURNING_RADPS = 0.03, 0.08
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pictures:
-    """Pictures in memory, as a search takes them."""
+class Images:
+    """Images in memory, as a search takes them."""
 
     pixels: tuple[np.ndarray, ...]
     names: tuple[str, ...]
@@ -45,32 +45,32 @@ class Pictures:
         return len(self.pixels)
 
     def name(self, index: int, /) -> str:
-        """Return a picture's name."""
+        """Return an image's name."""
         return self.names[index]
 
     def time_ns(self, index: int, /) -> TimeNs | None:
         """Return None: they have no times."""
         del index
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         """Return its pixels."""
         return self.pixels[index]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """Pictures of one board through one lens, with the truth.
+    """Images of one board through one lens, with the truth.
 
     Attributes:
         camera: the true lens.
         board: as stated.
-        pictures: for the search.
-        corners_px: the true corners of each picture, by id.
+        images: for the search.
+        corners_px: the true corners of each image, by id.
     """
 
     camera: Camera
     board: Board
-    pictures: Pictures
+    images: Images
     corners_px: tuple[np.ndarray, ...]
 
 
@@ -118,7 +118,7 @@ def drawn_series(
         for pose, one in zip(poses, films, strict=True)
     ]
     true = tuple(_true(board, camera, pose, one) for pose, one in zip(poses, films, strict=True))
-    return Series(camera, board, Pictures(tuple(pixels), tuple(f"view {i + 1}" for i in range(views))), true)
+    return Series(camera, board, Images(tuple(pixels), tuple(f"view {i + 1}" for i in range(views))), true)
 
 
 def _true(board: Board, camera: Camera, pose: RigidTransform, film: BoardFilm) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Lenses calibrated from rendered pictures: how far off corners and focal length are, and which model is chosen."""
+"""Lenses calibrated from rendered images: how far off corners and focal length are, and which model is chosen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ __all__ = ["Rendered", "boards", "films", "measured"]
 _HEAD = (
     "draws",
     "views used",
-    "picture covered",
+    "image covered",
     "corner error, rms per axis [px]",
     "95 % below [px]",
     "focal error, median [%]",
@@ -26,11 +26,11 @@ _HEAD = (
 
 @dataclass(frozen=True, slots=True)
 class Rendered:
-    """What one series of pictures gives.
+    """What one series of images gives.
 
     Attributes:
         views: that were used; 0 if there is no calibration.
-        covered: share of the picture in the hull of all corners.
+        covered: share of the image in the hull of all corners.
         errors_px: of all corners found, per axis, against the truth.
         focal_error: estimated over true focal length, less 1.
         scaled: errors of the parameters over their stated sigma, if the model is the true one.
@@ -46,8 +46,8 @@ class Rendered:
 
 
 def measured(series: Series) -> Rendered:
-    """Search and calibrate one series of pictures."""
-    search = search_boards(series.pictures, series.board)
+    """Search and calibrate one series of images."""
+    search = search_boards(series.images, series.board)
     if not isinstance(search, BoardSearch):
         return Rendered(0, 0.0, (), float("nan"), (), search.code)
     errors, found = [], []

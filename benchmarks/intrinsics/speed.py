@@ -36,7 +36,7 @@ class _Film:
     def time_ns(self, index: int, /) -> TimeNs | None:
         return TimeNs(index * 33_000_000)
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         return np.asarray(cv2.imdecode(self.frames[index], cv2.IMREAD_COLOR))
 
 

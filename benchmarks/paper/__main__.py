@@ -10,10 +10,10 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.paper.fit import FIT_FILE, fit, read_fit, write_lines
+from benchmarks.paper.images import write_images
 from benchmarks.paper.judgement import differing
 from benchmarks.paper.moving import MOVING, acc_of, assumptions_of
 from benchmarks.paper.page import MEASURED_FILE, Measured, page, read_measured, table
-from benchmarks.paper.pictures import write_pictures
 from benchmarks.paper.rows import Seed, measure
 from benchmarks.paper.settings import FITTED, SEED_SETS, Settings
 
@@ -39,18 +39,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=len(SEED_SETS[0]), help="number of seeds of each set")
     parser.add_argument("--fit", action="store_true", help="run the fit and write fit.json; write no page")
     parser.add_argument("--rewrite", action="store_true", help="measure nothing; write the page from measured.json")
-    parser.add_argument("--pictures", action="store_true", help="measure nothing; draw the figures")
+    parser.add_argument("--images", action="store_true", help="measure nothing; draw the figures")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="number of processes")
     given = parser.parse_args(arguments)
     with ProcessPoolExecutor(max_workers=given.workers) as pool:
         if given.fit:
             write_lines(FIT_FILE, fit(pool), "settings")
             return 0
-        if not (given.rewrite or given.pictures):
+        if not (given.rewrite or given.images):
             write_lines(MEASURED_FILE, _measured(pool, given.seeds), "rows")
     measured = read_measured()
     if not given.rewrite:
-        write_pictures(_ROOT / "docs" / "pictures" / "paper", measured, FITTED)
+        write_images(_ROOT / "docs" / "images" / "paper", measured, FITTED)
     (_ROOT / "docs" / "paper-experiments.md").write_text(page(measured, FITTED, read_fit()), encoding="utf-8")
     print(table(measured))
     return 0

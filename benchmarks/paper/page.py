@@ -63,7 +63,7 @@ def page(measured: Measured, settings: Settings, fit: Fit) -> str:
 
 Written by `make paper`, measured on {measured.date}; do not edit. Everything is simulated: the authors' recordings are not published. Each row is a
 session of scans and clicks that went through the whole path: windows around the clicks, radar positions, pose. `tests/paper/test_experiments.py`
-shows for PPM, on 5 placements and pictures of 480 px, that recordings with pictures, read back from bags and solved by `cocalib solve`, give the same AED, and an
+shows for PPM, on 5 placements and images of 480 px, that recordings with images, read back from bags and solved by `cocalib solve`, give the same AED, and an
 independent script in `tests/paper/test_independent.py` computes AED, CDSD, PMM, CCM and the swaps from the paper's formulas alone.
 
 PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting, CCM the checkerboard (both in
@@ -83,7 +83,7 @@ wider than a factor of 2; *order of magnitude* if it is wider than a factor of 1
 {differ}
 
 PPM+D1, PPM+D2 and CCM+D2 were fitted, so that they agree is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn for each seed; that
-is why they are ranges. They rest on the size of the picture too: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be
+is why they are ranges. They rest on the size of the image too: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be
 {_with_focal_length(measured.sets, _SCRIPT_FOCAL_PX, settings)} without fitting again, and the judgement would turn to not reproduced.
 PPM+DR+D3 follows from gross errors that were chosen for it.
 
@@ -101,7 +101,7 @@ condition number of that problem is {np.median(conditions[:, 0]):,.0f} (median).
 but for rounding (condition number {conditions[:, 1].min():.0e} or more), however large the board is. The paper supposes another reason, that the board was too small and its
 data too dense. On the board that does not show: PPM's errors there are larger than CCM's,
 {_ratio(seeds)}.
-On D1 CCM puts {_ninety(100 * outside, ".0f")} % of the points outside the picture; in the paper all are. The ranges in this section hold the middle 90 %
+On D1 CCM puts {_ninety(100 * outside, ".0f")} % of the points outside the image; in the paper all are. The ranges in this section hold the middle 90 %
 of all seeds.
 
 ### The other rig
@@ -135,8 +135,8 @@ These are assumptions, the same for all rows:
 |---|---|---|---|
 | constant errors | azimuth {settings.constant_azimuth_deg:g} deg, elevation {settings.constant_elevation_deg:g} deg | fitted, see above | PPM, CCM |
 | board | {settings.board_corners} of 8 x 5 corners 0.30 m apart, 6.5 m away: {_board_px(settings):.0f} px between the outermost columns | the number was fitted; size and range are the preset's. The paper does not say which board was used; that of its intrinsics, 9 x 6 squares of 22.14 mm, is 0.2 m wide | CCM, PPM+D2 |
-| picture | {settings.width_px} x {settings.width_px * 9 // 16} px, 75 deg wide | that of our other studies. The intrinsics in the authors' published script (554 px, centre at 299, 265) are of a picture of about 640 x 480 | PMM; not PPM, where errors in px are what is fitted |
-| lens distortion | k1 = -0.17, k2 = 0.032, known to the calibration | the simulator's typical lens | CCM+D1, whose points lie far outside the picture, where this polynomial grows with the fifth power; the others hardly |
+| image | {settings.width_px} x {settings.width_px * 9 // 16} px, 75 deg wide | that of our other studies. The intrinsics in the authors' published script (554 px, centre at 299, 265) are of an image of about 640 x 480 | PMM; not PPM, where errors in px are what is fitted |
+| lens distortion | k1 = -0.17, k2 = 0.032, known to the calibration | the simulator's typical lens | CCM+D1, whose points lie far outside the image, where this polynomial grows with the fifth power; the others hardly |
 | mounting error | {settings.mounting_error_deg:g} deg per axis, and 1 cm per axis off the tape | that of our other studies | PMM |
 | placements | {settings.placements} on the ground | none: chosen instead of 20 after a first look at the rows of an earlier version | PPM+D1+T_m |
 | `outshone_share` | {settings.outshone_share:g} of the constant errors' variance | the middle of 0 to 1: this share is taken to come from clutter below the reflector, which a larger one outshines. Chosen after a first look at D3 in an earlier version | PPM+D3 |
@@ -175,20 +175,20 @@ Acc is not accuracy ([what it cannot see](evaluation.md#what-acc-cannot-see)).
 
 ## Figures
 
-All panels of the paper's Figs. 2 to 6, simulated. Each picture names its seed: of Figs. 2 to 4 the one whose AED and CDSD of the rows shown are nearest to the
+All panels of the paper's Figs. 2 to 6, simulated. Each image names its seed: of Figs. 2 to 4 the one whose AED and CDSD of the rows shown are nearest to the
 medians over both sets (sum of absolute logarithms; with the other rig, also how far its pose is off), of Figs. 5 and 6 the one of the {len(cars)} whose Acc by PPM
 and by PMM is nearest to theirs. Fig. 5 goes by labels and shows, of the frames with at least the median number of returns, the one whose shares of returns inside are nearest to Acc by
 both methods; (D) counts returns beyond 40 m. Fig. 6 goes by the radar's own targets.
 
-![Fig. 2, simulated: D1 by PPM and by PMM](pictures/paper/fig-2.svg)
+![Fig. 2, simulated: D1 by PPM and by PMM](images/paper/fig-2.svg)
 
-![Fig. 3, simulated: D2 by PPM and by CCM](pictures/paper/fig-3.svg)
+![Fig. 3, simulated: D2 by PPM and by CCM](images/paper/fig-3.svg)
 
-![Fig. 4, simulated: the aisle with the camera on the same and on another rig](pictures/paper/fig-4.svg)
+![Fig. 4, simulated: the aisle with the camera on the same and on another rig](images/paper/fig-4.svg)
 
-![Fig. 5, simulated: people, robot car, cars and a far car, by PPM and by PMM](pictures/paper/fig-5.svg)
+![Fig. 5, simulated: people, robot car, cars and a far car, by PPM and by PMM](images/paper/fig-5.svg)
 
-![Fig. 6, simulated: histograms of Acc](pictures/paper/fig-6.svg)
+![Fig. 6, simulated: histograms of Acc](images/paper/fig-6.svg)
 """
 
 

@@ -22,7 +22,7 @@ MOST_GROSS = 4
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """One row for one seed: AED and CDSD over all pairs, and the share of clicked radar positions outside the picture."""
+    """One row for one seed: AED and CDSD over all pairs, and the share of clicked radar positions outside the image."""
 
     aed_px: float
     cdsd_px: float

@@ -25,7 +25,7 @@ class Settings:
         board_corners: placements of D2, each at another corner of the checkerboard; fitted.
         gross_pairs: pairs of DR+D3 whose radar position is grossly wrong; chosen for that row.
         gross_m: by how much, in a random horizontal direction [m]; chosen for that row.
-        width_px: of the pictures, which are 16 to 9.
+        width_px: of the images, which are 16 to 9.
         mounting_error_deg: standard deviation of the true rotation about the nominal one, per axis [deg].
         placements: of the reflector on the ground, in D1 and D3.
         distortion: whether the lens has the typical one.
@@ -98,6 +98,6 @@ def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedRecordi
 
 
 def other_rig(d3: SimulatedRecording) -> SimulatedRecording:
-    """Return DR+D3: the same scans with the clicks in the second camera's pictures."""
+    """Return DR+D3: the same scans with the clicks in the second camera's images."""
     assert d3.other_camera is not None, "D3 has a second camera"
     return d3.other_camera

@@ -1,1 +1,1 @@
-"""How well the machine proposes where the reflector stands in the pictures, on recordings that nobody chose."""
+"""How well the machine proposes where the reflector stands in the images, on recordings that nobody chose."""

@@ -24,7 +24,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 _NAMES = ("cases", "square", "mismatched", "drives", "real", "speed")
 _HEAD = """# Accuracy of proposals
 
-Written by `python -m benchmarks.proposing`; do not edit. Simulated recordings of 10 to 14 placements, pictures of
+Written by `python -m benchmarks.proposing`; do not edit. Simulated recordings of 10 to 14 placements, images of
 1280 x 720: field, aisle, rooftop and a checkerboard wall, with either radar and every level of clutter in turn; at random
 light that changes (brightness by up to 60 %, tint, one change of exposure), passers-by, two reflectors at a time, a
 tripod, noise of the camera. A seed names one recording; seeds from 20,000 were not looked at before. "After one click" means
@@ -74,7 +74,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rows", nargs="+", choices=_NAMES, help="measure these tables only")
     parser.add_argument("--draws", type=int, help="number of recordings of each table")
     parser.add_argument("--first", type=int, default=20_000, help="seed of the first recording")
-    parser.add_argument("--recordings", type=int, default=40, help="recordings of which pictures and radar are mixed")
+    parser.add_argument("--recordings", type=int, default=40, help="recordings of which images and radar are mixed")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "proposing", help="where figures are kept")
     parser.add_argument("--frames", type=Path, help="where rendered frames are kept; by default below --scratch")
     parser.add_argument("--page", type=Path, default=Path(__file__).with_name("accuracy.md"), help="the page to write")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.proposing.cases import Case
-from benchmarks.proposing.pictures import ChangingLight, KeptPictures, SimulatedPictures
+from benchmarks.proposing.images import ChangingLight, KeptImages, SimulatedImages
 from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
@@ -53,13 +53,13 @@ def drawn_from(
     recording: SimulatedRecording, case: Case, folder: Path | None, frames: FrameSource | None = None
 ) -> Drawn:
     """Take a recording, or frames, that were simulated in another way as those of a case."""
-    pictures = SimulatedPictures(recording) if frames is None else frames
+    images = SimulatedImages(recording) if frames is None else frames
     if folder is not None:
-        pictures = KeptPictures(pictures, folder / case.name)
+        images = KeptImages(images, folder / case.name)
     if case.light:
-        pictures = ChangingLight(pictures, case.options.seed)
+        images = ChangingLight(images, case.options.seed)
     scans = _scans(recording, None if folder is None else folder / case.name / "scans.npz")
-    return Drawn(case, recording, scans, pictures, find_placements(scans, CalibrationOptions().gating))
+    return Drawn(case, recording, scans, images, find_placements(scans, CalibrationOptions().gating))
 
 
 def _scans(recording: SimulatedRecording, path: Path | None) -> RadarScans:

@@ -1,4 +1,4 @@
-"""What the machine accepts when it is left alone: on recordings, and on pictures and radar that do not belong together."""
+"""What the machine accepts when it is left alone: on recordings, and on images and radar that do not belong together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ from cocalib.solving.automatic import refusal_of
 
 __all__ = ["automatic_figures", "measure_mismatched"]
 
-_NO_PICTURE = np.zeros((0, 0, 3), dtype=np.uint8)
+_NO_IMAGE = np.zeros((0, 0, 3), dtype=np.uint8)
 
 
 def automatic_figures(proposals: Proposals, views: Sequence[DwellView], drawn: Drawn) -> Figures:
@@ -40,10 +40,10 @@ def automatic_figures(proposals: Proposals, views: Sequence[DwellView], drawn: D
 
 
 def measure_mismatched(folder: Path, first: int, recordings: int, trial: int) -> Figures:
-    """Give the machine what the radar saw in one recording and the pictures of another, or of other dwells of its own.
+    """Give the machine what the radar saw in one recording and the images of another, or of other dwells of its own.
 
-    The dwells are matched in order of time, so that pictures show a reflector for every dwell: a harder case than dwells
-    whose pictures show nothing. Every fourth trial takes a recording's own pictures, some dwells later.
+    The dwells are matched in order of time, so that images show a reflector for every dwell: a harder case than dwells
+    whose images show nothing. Every fourth trial takes a recording's own images, some dwells later.
 
     Args:
         folder: where frames are kept.
@@ -54,13 +54,13 @@ def measure_mismatched(folder: Path, first: int, recordings: int, trial: int) ->
     cv2.setNumThreads(1)
     rng = np.random.default_rng([first, trial, 18])
     seeds = rng.choice(recordings, 2, replace=False) + first
-    pictures, camera = _views(folder, int(seeds[0]))
-    radar = pictures if trial % 4 == 0 else _views(folder, int(seeds[1]))[0]
-    count = min(len(pictures), len(radar))
+    images, camera = _views(folder, int(seeds[0]))
+    radar = images if trial % 4 == 0 else _views(folder, int(seeds[1]))[0]
+    count = min(len(images), len(radar))
     if count < 2:
         return {}
     shift = int(rng.integers(1, count)) if trial % 4 == 0 else 0
-    mixed = tuple(_seen_at(pictures[i], radar[(i + shift) % count]) for i in range(count))
+    mixed = tuple(_seen_at(images[i], radar[(i + shift) % count]) for i in range(count))
     proposals = proposals_of(mixed, camera, CalibrationOptions())
     outcome = automatic_clicks(proposals, mixed, camera, CalibrationOptions())
     accepted = not isinstance(outcome, Unsolvable)
@@ -74,13 +74,13 @@ def measure_mismatched(folder: Path, first: int, recordings: int, trial: int) ->
 
 @cache
 def _views(folder: Path, seed: int) -> tuple[tuple[DwellView, ...], Camera]:
-    """Return what the pictures of a recording show at the dwells that are real, without the pictures."""
+    """Return what the images of a recording show at the dwells that are real, without the images."""
     drawn = draw(case_of(seed), folder)
     views = dwell_views(drawn.placements, drawn.frames, drawn.recording.camera)
     real = [view for view in views if true_placement(view.placement, drawn.recording) is not None]
-    return tuple(replace(view, picture=_NO_PICTURE, stills=()) for view in real), drawn.recording.camera
+    return tuple(replace(view, image=_NO_IMAGE, stills=()) for view in real), drawn.recording.camera
 
 
-def _seen_at(pictures: DwellView, radar: DwellView) -> DwellView:
+def _seen_at(images: DwellView, radar: DwellView) -> DwellView:
     position_radar_m = radar.placement.position_radar_m
-    return replace(pictures, placement=replace(pictures.placement, position_radar_m=position_radar_m))
+    return replace(images, placement=replace(images.placement, position_radar_m=position_radar_m))

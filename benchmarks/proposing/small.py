@@ -1,4 +1,4 @@
-"""Small cases for tests: few placements, small pictures, and a backdrop that is not traced ray by ray."""
+"""Small cases for tests: few placements, small images, and a backdrop that is not traced ray by ray."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.proposing.cases import Case, case_of
 from benchmarks.proposing.drawn import Drawn, drawn_from
-from benchmarks.proposing.pictures import SimulatedPictures
+from benchmarks.proposing.images import SimulatedImages
 from calib_core.arrays import TimesNs
 from calib_core.proposing import FrameSource
 from calib_core.synthetic.recording import SimulatedRecording, simulate
@@ -26,7 +26,7 @@ _COARSE_PX = 20
 
 
 def small_case(seed: int) -> Case:
-    """Return the case of a seed with fewer and smaller pictures; every fourth has enough placements for `--auto`."""
+    """Return the case of a seed with fewer and smaller images; every fourth has enough placements for `--auto`."""
     case = case_of(seed)
     options = replace(
         case.options,
@@ -45,9 +45,7 @@ def draw_small(seed: int, renderer: Callable[..., FrameRenderer] = FrameRenderer
     """Simulate a small case; nothing is kept on the disk."""
     case = small_case(seed)
     recording = simulate(case.options)
-    return drawn_from(
-        recording, case, None, _Remembered(SimulatedPictures(recording, _rendered_by(renderer, recording)))
-    )
+    return drawn_from(recording, case, None, _Remembered(SimulatedImages(recording, _rendered_by(renderer, recording))))
 
 
 class _Remembered:

@@ -1,4 +1,4 @@
-"""How long a recording of half an hour takes: 20 scans and 30 pictures of 1920 x 1080 a second."""
+"""How long a recording of half an hour takes: 20 scans and 30 images of 1920 x 1080 a second."""
 
 import os
 import threading
@@ -40,7 +40,7 @@ _OPTIONS = SimulationOptions(
 
 @dataclass(slots=True)
 class _Filmed:
-    """A recording with 30 pictures a second, each the JPEG of the simulated frame nearest in time; it counts those decoded.
+    """A recording with 30 images a second, each the JPEG of the simulated frame nearest in time; it counts those decoded.
 
     Attributes:
         image_times: stamps of the frames.
@@ -81,7 +81,7 @@ class _Filmed:
 
 
 def speed_table(first: int, frames: Path) -> Table:
-    """Measure one long recording, from its scans and compressed pictures to proposals.
+    """Measure one long recording, from its scans and compressed images to proposals.
 
     Args:
         first: its seed.
@@ -122,7 +122,7 @@ def speed_table(first: int, frames: Path) -> Table:
     return Table("Speed", head, (row,), _NOTE)
 
 
-_NOTE = """Pictures of 1920 x 1080 repeat: a frame is the JPEG of the nearest of those rendered every five seconds, decoded each
+_NOTE = """Images of 1920 x 1080 repeat: a frame is the JPEG of the nearest of those rendered every five seconds, decoded each
 time it is asked for; reading from a file is not part of it. First results: the first dwell with candidates is reported. The
 aims: all in a minute on two processors that have nothing else to do, first results after five seconds, and only the frames
 decoded that are needed."""

@@ -23,7 +23,7 @@ _CARRIED_M = 0.35
 
 
 def with_square_reflectors(recording: SimulatedRecording) -> SimulatedRecording:
-    """Return a recording whose pictures show reflectors of squares."""
+    """Return a recording whose images show reflectors of squares."""
     return _Recording(recording.stage, recording.placements, recording.clicked)
 
 

@@ -95,7 +95,7 @@ def real_recordings() -> tuple[Path, ...]:
 
 
 def measure_real(path: Path) -> Figures | str:
-    """Measure a real recording; text if it has no radar or no pictures to be proposed in."""
+    """Measure a real recording; text if it has no radar or no images to be proposed in."""
     try:
         with open_recording(path) as recording:
             camera = recording.camera()

@@ -1,4 +1,4 @@
-"""What is accepted where nothing is right: without a reflector, and with pictures and radar of different recordings."""
+"""What is accepted where nothing is right: without a reflector, and with images and radar of different recordings."""
 
 from collections.abc import Mapping
 
@@ -36,18 +36,18 @@ from place to place and stands there as with a reflector, but has none. The aim:
 
 
 def mismatched_table(kept: Mapping[int, Figures], recordings: int) -> Table:
-    """Tell whether anything is accepted of pictures and radar that do not belong together."""
+    """Tell whether anything is accepted of images and radar that do not belong together."""
     rows = []
     for words, own in (("radar of another recording", 0.0), ("radar of the same recording, dwells shifted", 1.0)):
         trials = [trial for trial in kept.values() if trial and trial["own"] == own]
         accepted = limit_95(int(summed(trials, "accepted")), len(trials))
         rows.append((words, str(len(trials)), accepted))
-    head = ("pictures of one recording with", "pairs", "accepted by --auto")
-    return Table("Pictures and radar that do not belong together", head, tuple(rows), _MISMATCHED.format(recordings))
+    head = ("images of one recording with", "pairs", "accepted by --auto")
+    return Table("Images and radar that do not belong together", head, tuple(rows), _MISMATCHED.format(recordings))
 
 
-_MISMATCHED = """The dwells are matched in order of time, so that the pictures show a reflector for each: a harder case than
-pictures of other times, in which nothing stands. Only dwells of true placements take part. The pairs
+_MISMATCHED = """The dwells are matched in order of time, so that the images show a reflector for each: a harder case than
+images of other times, in which nothing stands. Only dwells of true placements take part. The pairs
 come of {} recordings, so that they are not independent of each other, as the limit supposes. The aim: 0 in 1,000 pairs of at
 least 40 recordings."""
 

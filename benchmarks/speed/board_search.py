@@ -26,7 +26,7 @@ class _Frames:
         poses = waved_poses(np.random.default_rng(3), _BOARD, camera, _RENDERED)
         film = BoardFilm(blur_px=0.7, noise_grey=2.0)
         shown = [render_board(_BOARD, camera, pose, film, seed=number) for number, pose in enumerate(poses)]
-        self._encoded = [cv2.imencode(".jpg", picture)[1] for picture in shown]
+        self._encoded = [cv2.imencode(".jpg", image)[1] for image in shown]
 
     def __len__(self) -> int:
         return _FRAMES
@@ -37,7 +37,7 @@ class _Frames:
     def time_ns(self, index: int, /) -> TimeNs | None:
         return None
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         return np.asarray(cv2.imdecode(self._encoded[index % _RENDERED], cv2.IMREAD_COLOR))
 
 
@@ -49,7 +49,7 @@ def measure_board_search() -> Table:
     wall_s, ours_s = time.perf_counter() - wall, time.process_time() - processor
     processor = time.process_time()
     for index in range(_RENDERED):
-        cv2.findChessboardCorners(cv2.cvtColor(frames.picture(index), cv2.COLOR_BGR2GRAY), (9, 6))
+        cv2.findChessboardCorners(cv2.cvtColor(frames.image(index), cv2.COLOR_BGR2GRAY), (9, 6))
     peer_s = (time.process_time() - processor) * _FRAMES / _RENDERED
     row = Row(
         f"{_FRAMES} frames",

@@ -1,4 +1,4 @@
-// Runs in the page: measures from the pointer's release to the painted picture. Evaluated by benchmarks/speed/paging.py.
+// Runs in the page: measures from the pointer's release to the painted image. Evaluated by benchmarks/speed/paging.py.
 () => {
   const { state, clicks, clickIn, goTo, toCss } = window.__cocalib;
   const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));

@@ -100,15 +100,15 @@ def _compared(scratch: Path) -> Table:
     before, now = times_ms.values()
     return Table(
         f"The page against {_EARLIER}",
-        f"The sample with its 20 pairs and the 3D view next to the picture, in Chromium; {_ROUNDS} rounds of both versions "
+        f"The sample with its 20 pairs and the 3D view next to the image, in Chromium; {_ROUNDS} rounds of both versions "
         f"in turn, in each {_CLICKS} marks dragged by 6 px as soon as the page is there, while this version looks for proposals, "
-        f"and {_STEPS} frames stepped. From the pointer's release to the painted picture: medians (95th percentiles). "
+        f"and {_STEPS} frames stepped. From the pointer's release to the painted image: medians (95th percentiles). "
         "The earlier version shows its answer in one step. Alone: `python -m benchmarks.speed.paging`.",
         (
             _against("click to mark", before["mark"], now["mark"], 1.0),
             _against("click to the preview's overlay, against the answer's", before["answer"], now["preview"], 0.8),
             _against("click to the answer's overlay", before["answer"], now["answer"], 1.5),
-            _against("frame step to shown picture", before["step"], now["step"], 1.0),
+            _against("frame step to shown image", before["step"], now["step"], 1.0),
             _against("start of `cocalib open` to the first frame, browser included", before["ready"], now["ready"]),
         ),
     )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed.rows import Row, Table
-from calib_core.recordings import first_picture, open_recording
+from calib_core.recordings import first_image, open_recording
 from cocalib.platform.process import keep_freed_memory
 
 __all__ = ["measure_recordings", "write_bag"]
@@ -25,7 +25,7 @@ _FRAMES = 2_000
 _DECODINGS = 4
 _MEMORY = """
 import pathlib, resource, sys
-from calib_core.recordings import first_picture, open_recording
+from calib_core.recordings import first_image, open_recording
 from cocalib.platform.process import keep_freed_memory
 import cv2
 keep_freed_memory()
@@ -78,10 +78,10 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
         path.unlink()
     return Table(
         "Recordings",
-        "Bags generated for this run and then deleted: pictures of 1920 x 1080 and ten radar clouds a second, 0.6 GB or 5 GB; "
+        "Bags generated for this run and then deleted: images of 1920 x 1080 and ten radar clouds a second, 0.6 GB or 5 GB; "
         "the one of 100 GB is a mostly empty sparse file. Read by cocalib and by rosbags in turn. Cold: the file's pages are "
-        "dropped from the system's cache before each opening; medians. The first picture is at the beginning of the file; "
-        "the timeline has the stamps of all pictures and scans, each read from its message. Decoding and seeking are in "
+        "dropped from the system's cache before each opening; medians. The first image is at the beginning of the file; "
+        "the timeline has the stamps of all images and scans, each read from its message. Decoding and seeking are in "
         "processor time. Our seeks and bare decodes of the same bytes alternate.",
         tuple(rows),
     )
@@ -101,16 +101,16 @@ def write_bag(
     size_px: tuple[int, int] = (1920, 1080),
     one_scene: bool = False,
 ) -> Path:
-    """Write a bag with rosbags; with holes, its pictures are far apart in a sparse file; of one scene, only noise differs."""
+    """Write a bag with rosbags; with holes, its images are far apart in a sparse file; of one scene, only noise differs."""
     from rosbags.rosbag1 import Writer
 
     writer = Writer(path)
     if compression:
         writer.set_compression(Writer.CompressionFormat[compression.upper()])
-    pictures = _pictures(size_px, one_scene=one_scene)
+    images = _images(size_px, one_scene=one_scene)
     with writer:
         topics = _connections(writer, returns > 0)
-        for time_ns, topic, data in _messages(frames, returns, clouds, pictures):
+        for time_ns, topic, data in _messages(frames, returns, clouds, images):
             if hole_bytes and topic == "/camera/image/compressed":
                 _flush(writer)
                 writer.bio.seek(hole_bytes, os.SEEK_CUR)  # readers use the index and never read this part
@@ -136,18 +136,18 @@ def _connections(writer: Any, returns: bool) -> dict[str, Any]:
     return {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in types.items()}
 
 
-def _messages(frames: int, returns: int, clouds: int, pictures: list[bytes]) -> Iterator[tuple[int, str, bytes]]:
+def _messages(frames: int, returns: int, clouds: int, images: list[bytes]) -> Iterator[tuple[int, str, bytes]]:
     if returns:
         for number in range(returns):
             at = _START_NS + number * 1_000_000
             yield at, "/radar", _header(at, "radar") + struct.pack("<HfffffHff", number % 12, 3, 1, 0, 3, 0, 1, 0.3, 10)
-        yield _START_NS, "/camera/image/compressed", _picture(_START_NS, pictures[0])
+        yield _START_NS, "/camera/image/compressed", _image(_START_NS, images[0])
         return
     cloud = _cloud_body()
     for number in range(max(frames, clouds)):
         at = _START_NS + number * _FRAME_NS
         if number < frames:
-            yield at, "/camera/image/compressed", _picture(at, pictures[number % len(pictures)])
+            yield at, "/camera/image/compressed", _image(at, images[number % len(images)])
         if number % 3 == 0 or clouds:
             yield at + 1, "/radar", _header(at, "radar") + cloud
 
@@ -156,7 +156,7 @@ def _header(at: int, frame: str) -> bytes:
     return struct.pack("<IIII", 0, *divmod(at, 10**9), len(frame)) + frame.encode()
 
 
-def _picture(at: int, jpeg: bytes) -> bytes:
+def _image(at: int, jpeg: bytes) -> bytes:
     return _header(at, "camera") + struct.pack("<I4sI", 4, b"jpeg", len(jpeg)) + jpeg
 
 
@@ -170,20 +170,20 @@ def _cloud_body() -> bytes:
     return head + struct.pack("<?III", False, 20, len(points), len(points)) + points + b"\x01"
 
 
-def _pictures(size_px: tuple[int, int], *, one_scene: bool) -> list[bytes]:
+def _images(size_px: tuple[int, int], *, one_scene: bool) -> list[bytes]:
     import cv2
 
     rng = np.random.default_rng(2)
-    pictures = []
+    images = []
     small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
     for number in range(4):
         if number and not one_scene:
             small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
-        picture = cv2.resize(small, size_px, interpolation=cv2.INTER_CUBIC)
-        noise = rng.integers(-6, 6, picture.shape, dtype=np.int16)
-        picture = np.clip(picture + noise, 0, 255).astype(np.uint8)
-        pictures.append(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 75])[1].tobytes())
-    return pictures
+        image = cv2.resize(small, size_px, interpolation=cv2.INTER_CUBIC)
+        noise = rng.integers(-6, 6, image.shape, dtype=np.int16)
+        image = np.clip(image + noise, 0, 255).astype(np.uint8)
+        images.append(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 75])[1].tobytes())
+    return images
 
 
 # -- measurements
@@ -191,7 +191,7 @@ def _pictures(size_px: tuple[int, int], *, one_scene: bool) -> list[bytes]:
 
 def _opening(path: Path, cache: Path) -> list[Row]:
     size = f"{path.stat().st_size / 1e9:.1f} GB"
-    works = (_first_frame_rosbags, _first_picture, _timeline)
+    works = (_first_frame_rosbags, _first_image, _timeline)
     turns = [[_cold(path, work) for work in works] for _ in range(_OPENINGS)]
     peer, first, whole = np.median(turns, axis=0).tolist()
     os.environ["COCALIB_CACHE"] = str(cache)
@@ -199,9 +199,9 @@ def _opening(path: Path, cache: Path) -> list[Row]:
     again = float(np.median([_cold(path, _timeline) for _ in range(_OPENINGS)]))
     os.environ["COCALIB_CACHE"] = "off"
     return [
-        Row(f"{size}, cold: rosbags.AnyReader, to the first picture", f"{peer * 1e3:.0f} ms"),
+        Row(f"{size}, cold: rosbags.AnyReader, to the first image", f"{peer * 1e3:.0f} ms"),
         Row(
-            f"{size}, cold: ours, to the first picture",
+            f"{size}, cold: ours, to the first image",
             f"{first * 1e3:.1f} ms",
             f"1/{peer / first:.1f} of rosbags",
             "at most 1/20 of rosbags",
@@ -210,12 +210,12 @@ def _opening(path: Path, cache: Path) -> list[Row]:
         Row(
             f"{size}, cold: ours, to the whole timeline and its first frame",
             f"{whole * 1e3:.0f} ms",
-            f"1/{peer / whole:.1f} of rosbags' first picture",
+            f"1/{peer / whole:.1f} of rosbags' first image",
         ),
         Row(
             f"{size}, cold: the same again, with the index kept",
             f"{again * 1e3:.1f} ms",
-            f"1/{peer / again:.1f} of rosbags' first picture",
+            f"1/{peer / again:.1f} of rosbags' first image",
         ),
     ]
 
@@ -230,8 +230,8 @@ def _cold(path: Path, work: Callable[[Path], None]) -> float:
     return time.perf_counter() - start
 
 
-def _first_picture(path: Path) -> None:
-    assert first_picture([path]) is not None
+def _first_image(path: Path) -> None:
+    assert first_image([path]) is not None
 
 
 def _timeline(path: Path) -> None:

@@ -27,9 +27,9 @@ def peak():
 kind, path, out = sys.argv[1:4]
 nan = float("nan")
 with open_recording(path) as recording:
-    picture = recording.image_bytes(0)
-    matrix = np.array([[900.0, 0, picture.width_px / 2], [0, 900, picture.height_px / 2], [0, 0, 1]])
-    camera = Camera("plumb_bob", picture.width_px, picture.height_px, matrix, np.array([-0.1, 0.02, 0.001, 0.0]))
+    image = recording.image_bytes(0)
+    matrix = np.array([[900.0, 0, image.width_px / 2], [0, 900, image.height_px / 2], [0, 0, 1]])
+    camera = Camera("plumb_bob", image.width_px, image.height_px, matrix, np.array([-0.1, 0.02, 0.001, 0.0]))
     ahead = RigidTransform(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]), np.zeros(3))
     calibration = Calibration(ahead, np.eye(6) * 1e-4, camera, Metrics(), (), (), (), CalibrationOptions())
     view = recorded_view(recording, calibration, "range")
@@ -67,7 +67,7 @@ def measure_showing(scratch: Path) -> Table:
         path.unlink()
     return Table(
         "Recordings for Rerun and overlay videos",
-        "Bags generated for this run: pictures at 30 Hz, ten clouds of 120 returns a second; those of the overlay video are of "
+        "Bags generated for this run: images at 30 Hz, ten clouds of 120 returns a second; those of the overlay video are of "
         "one scene and differ in their noise. The times are the processor time, of all threads together, of the conversion of "
         "an open recording.",
         rows,

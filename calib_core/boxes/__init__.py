@@ -1,4 +1,4 @@
-"""Boxes around objects, from the files of labelling tools, from topics of a recording, and from a fixed rig's pictures."""
+"""Boxes around objects, from the files of labelling tools, from topics of a recording, and from a fixed rig's images."""
 
 from calib_core.boxes.formats.own import boxes_text, labels_text, read_labels
 from calib_core.boxes.moving import MOVING, changed_boxes

@@ -2,7 +2,7 @@
 
 The background is the median of frames spread over the recording, its noise the median deviation from it. A frame's
 brightness is fitted to the background per channel, pixels that differ by many sigmas are joined to regions, regions to
-boxes, and boxes that overlap from frame to frame to tracks. Everything happens in pictures of at most 480 pixels across.
+boxes, and boxes that overlap from frame to frame to tracks. Everything happens in images of at most 480 pixels across.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ _UNSTEADY_SIGMA = 10.0
 """Grey levels: beyond it, a pixel shows different things at different times."""
 _SIGMAS = 6.0
 _LEAST_AREA = 40
-"""Pixels of the working picture: a person of 5 by 16 pixels has some 50."""
+"""Pixels of the working image: a person of 5 by 16 pixels has some 50."""
 _DEEPEST_SHADOW = 0.5
 _SHADOW_TINT = 0.12
 """Of the factor by which a shadow darkens the channels: the sky still lights it, bluer than the sun."""
@@ -74,16 +74,16 @@ def changed_boxes(
     Raises:
         InputError: there are too few readable frames, nothing moves, or the camera itself does.
     """
-    pictures = list(_readable(read_image, _spread(len(image_times), _BACKGROUND_FRAMES)))
-    if len(pictures) < _FEWEST_FRAMES:
+    images = list(_readable(read_image, _spread(len(image_times), _BACKGROUND_FRAMES)))
+    if len(images) < _FEWEST_FRAMES:
         raise InputError(
-            f"{source}: {len(pictures)} readable frames; finding movement needs {_FEWEST_FRAMES} or more: record for longer"
+            f"{source}: {len(images)} readable frames; finding movement needs {_FEWEST_FRAMES} or more: record for longer"
         )
-    small = [_reduced(picture) for _, picture in pictures]
-    size = (pictures[0][1].shape[1], pictures[0][1].shape[0])
-    del pictures
+    small = [_reduced(image) for _, image in images]
+    size = (images[0][1].shape[1], images[0][1].shape[0])
+    del images
     background = _background(small)
-    _refuse_moving_camera([_changed(picture, background) for picture in small], background, source)
+    _refuse_moving_camera([_changed(image, background) for image in small], background, source)
     found: list[tuple[TimeNs, list[Box]]] = []
     stretches = _stretches(image_times, most_frames)
     total = sum(map(len, stretches))
@@ -91,8 +91,8 @@ def changed_boxes(
     first_track = 1
     for stretch in stretches:
         found = []
-        for index, picture in _readable(read_image, stretch):
-            found.append((TimeNs(int(image_times[index])), _regions(_changed(_reduced(picture), background), size)))
+        for index, image in _readable(read_image, stretch):
+            found.append((TimeNs(int(image_times[index])), _regions(_changed(_reduced(image), background), size)))
             if progress:
                 progress(len(named) + len(found), total)
         tracks = tracked([boxes for _, boxes in found], first_track)
@@ -100,7 +100,7 @@ def changed_boxes(
         named.extend(FrameBoxes(time, boxes) for (time, _), boxes in zip(found, tracks, strict=True))
     if not any(frame.boxes for frame in named):
         raise NoAnswerError(f"{source}: nothing moves in {len(named)} frames looked at; give a file or topic of boxes")
-    note = f"boxes are around whatever changes in the picture; {len(named)} of {len(image_times)} frames were looked at"
+    note = f"boxes are around whatever changes in the image; {len(named)} of {len(image_times)} frames were looked at"
     return Boxes(tuple(named), source, size, (note,))
 
 
@@ -109,10 +109,10 @@ def _readable(read_image: Callable[[int], np.ndarray], indices: Sequence[int]) -
     shape: tuple[int, ...] = ()
     for index in indices:
         with contextlib.suppress(MessageError):
-            picture = read_image(index)
-            shape = shape or picture.shape
-            if picture.shape == shape:
-                yield index, picture
+            image = read_image(index)
+            shape = shape or image.shape
+            if image.shape == shape:
+                yield index, image
 
 
 def _spread(count: int, most: int) -> list[int]:
@@ -136,23 +136,23 @@ def _stretches(image_times: TimesNs, most: int) -> list[range]:
     return [range(start, start + span, step) for start in starts]
 
 
-def _reduced(picture: np.ndarray) -> np.ndarray:
-    """Reduce a picture to the working size; each pixel is the mean of those it replaces."""
+def _reduced(image: np.ndarray) -> np.ndarray:
+    """Reduce an image to the working size; each pixel is the mean of those it replaces."""
     import cv2
 
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     if width <= _WORKING_WIDTH_PX:
-        return np.ascontiguousarray(picture)
+        return np.ascontiguousarray(image)
     reduced_height = max(1, round(height * _WORKING_WIDTH_PX / width))
-    return np.asarray(cv2.resize(picture, (_WORKING_WIDTH_PX, reduced_height), interpolation=cv2.INTER_AREA))
+    return np.asarray(cv2.resize(image, (_WORKING_WIDTH_PX, reduced_height), interpolation=cv2.INTER_AREA))
 
 
-def _background(pictures: Sequence[np.ndarray]) -> _Background:
+def _background(images: Sequence[np.ndarray]) -> _Background:
     """Return the median of the frames, each brought to its brightness, and what is left of their deviations from it."""
-    stack = np.stack(pictures)
+    stack = np.stack(images)
     median = np.median(stack, axis=0).astype(np.float32)
-    for picture in stack:
-        picture[...] = np.clip(picture / _gain(picture.astype(np.float32), median), 0, 255)
+    for image in stack:
+        image[...] = np.clip(image / _gain(image.astype(np.float32), median), 0, 255)
     median = np.median(stack, axis=0).astype(np.float32)
     deviation = np.median(np.abs(stack - median), axis=0).astype(np.float32)
     return _Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
@@ -168,11 +168,11 @@ def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:
     return np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
 
 
-def _changed(picture: np.ndarray, background: _Background) -> np.ndarray:
+def _changed(image: np.ndarray, background: _Background) -> np.ndarray:
     """Return which pixels of a frame differ from the background: (h, w) bool, cleaned of specks."""
     import cv2
 
-    values = picture.astype(np.float32)
+    values = image.astype(np.float32)
     expected = _gain(values, background.median) * background.median
     off = np.abs(values - expected) / background.sigma
     strong = ((off.max(axis=-1) > _SIGMAS) & ~_is_shadow(values, expected)).astype(np.uint8)
@@ -192,7 +192,7 @@ def _is_shadow(values: np.ndarray, expected: np.ndarray) -> np.ndarray:
 
 
 def _refuse_moving_camera(masks: Sequence[np.ndarray], background: _Background, source: str) -> None:
-    """Refuse frames in which most of the picture changes.
+    """Refuse frames in which most of the image changes.
 
     Raises:
         InputError: it does, in most frames.
@@ -202,13 +202,13 @@ def _refuse_moving_camera(masks: Sequence[np.ndarray], background: _Background, 
     moved = int(np.count_nonzero(shares > _MOST_CHANGED))
     if moved > _MOST_CHANGED_FRAMES * len(shares):
         raise InputError(
-            f"{source}: more than {100 * _MOST_CHANGED:.0f} % of the picture changes in {moved} of {len(shares)} frames, so "
+            f"{source}: more than {100 * _MOST_CHANGED:.0f} % of the image changes in {moved} of {len(shares)} frames, so "
             "the camera itself moves; movement is found for a fixed camera only: give a file or topic of boxes"
         )
 
 
 def _regions(mask: np.ndarray, size: tuple[int, int]) -> list[Box]:
-    """Return a box around each region of a mask, in pixels of the recorded picture."""
+    """Return a box around each region of a mask, in pixels of the recorded image."""
     import cv2
 
     if mask.mean() > _MOST_CHANGED:  # a flash, or the exposure at work

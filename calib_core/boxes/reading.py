@@ -1,7 +1,7 @@
 """Read boxes from a file, folder or zip archive of any known format, and match them to recorded frames.
 
-The rule, which docs/boxes.md states: equal names of files are one frame; else a stamp, or a time in a picture's name, is the
-recorded frame within 1 ms of it; else a number counts the recorded frames from 0 or 1. A file whose stamps, count or pictures
+The rule, which docs/boxes.md states: equal names of files are one frame; else a stamp, or a time in an image's name, is the
+recorded frame within 1 ms of it; else a number counts the recorded frames from 0 or 1. A file whose stamps, count or images
 differ is of another recording.
 
 The formats are asked in the order of `BOX_FORMATS`. To add one: write its module in `formats/`, and add it there.
@@ -49,7 +49,7 @@ def read_boxes(
     Args:
         path: of the file, of a folder with one file per frame, or of a zip archive of either.
         image_times: (m,) stamps of the recorded frames, ascending.
-        image_size_px: width and height of the recorded pictures; None if unknown.
+        image_size_px: width and height of the recorded images; None if unknown.
         image_names: (m,) of the frames' files without suffix; none if they are not files.
 
     Raises:
@@ -68,7 +68,7 @@ def boxes_from_bytes(
         data: the content.
         name: the file's, for messages and for what its ending says.
         image_times: (m,) stamps of the recorded frames, ascending.
-        image_size_px: width and height of the recorded pictures.
+        image_size_px: width and height of the recorded images.
         image_names: (m,) of the frames' files without suffix; none if they are not files.
 
     Raises:
@@ -119,7 +119,7 @@ def load_box_file(path: Path, *, image_size_px: tuple[int, int] | None) -> BoxFi
 
     Args:
         path: of a file, a folder or a zip archive.
-        image_size_px: width and height of the recorded pictures; None if unknown.
+        image_size_px: width and height of the recorded images; None if unknown.
 
     Raises:
         InputError: it cannot be read, is damaged, or is too large.
@@ -222,7 +222,7 @@ def matched_boxes(
         found: the file's content.
         source: its name, for messages.
         image_times: (m,) stamps of the recorded frames, ascending.
-        image_size_px: width and height of the recorded pictures; None if unknown.
+        image_size_px: width and height of the recorded images; None if unknown.
         image_names: (m,) of the frames' files without suffix; none if they are not files.
 
     Raises:
@@ -234,7 +234,7 @@ def matched_boxes(
         )
     if not found.frames:
         raise InputError(f"{source}: has no annotated frame; export it again with its frames")
-    _refuse_other_pictures(found, source, image_size_px)
+    _refuse_other_images(found, source, image_size_px)
     by_name = _by_name(found.frames, image_names)
     stamps = _stamps_of(found.frames) if by_name is None else None
     if by_name is not None:
@@ -247,8 +247,8 @@ def matched_boxes(
     return Boxes(frames, source, image_size_px or found.image_size_px, (*found.notes, *notes))
 
 
-def _refuse_other_pictures(found: FileBoxes, source: str, image_size_px: tuple[int, int] | None) -> None:
-    """Refuse boxes that were made on pictures of another size, or that lie beside the picture.
+def _refuse_other_images(found: FileBoxes, source: str, image_size_px: tuple[int, int] | None) -> None:
+    """Refuse boxes that were made on images of another size, or that lie beside the image.
 
     Raises:
         InputError: they were.
@@ -259,14 +259,14 @@ def _refuse_other_pictures(found: FileBoxes, source: str, image_size_px: tuple[i
     if found.image_size_px is not None and found.image_size_px != image_size_px:
         made_width, made_height = found.image_size_px
         raise InputError(
-            f"{source}: its boxes were made on pictures of {made_width} x {made_height} px, the recorded ones have "
-            f"{width} x {height}; export the boxes for the recorded pictures, or give the other camera's topic"
+            f"{source}: its boxes were made on images of {made_width} x {made_height} px, the recorded ones have "
+            f"{width} x {height}; export the boxes for the recorded images, or give the other camera's topic"
         )
     boxes = [box for frame in found.frames for box in frame.boxes]
     inside = sum(_touches(box, width, height) for box in boxes)
     if boxes and inside < _LEAST_INSIDE * len(boxes):
         raise InputError(
-            f"{source}: {len(boxes) - inside} of {len(boxes)} boxes lie outside the picture of {width} x {height} px; "
+            f"{source}: {len(boxes) - inside} of {len(boxes)} boxes lie outside the image of {width} x {height} px; "
             f"{_OTHER}"
         )
 
@@ -277,19 +277,19 @@ def _touches(box: Box, width_px: int, height_px: int) -> bool:
 
 
 def _by_name(frames: Sequence[FileFrame], image_names: Sequence[str]) -> tuple[Indices, tuple[str, ...]] | None:
-    """Return the recorded frame of each frame by the name of its picture, -1 for none, and notes; None if no name is equal."""
+    """Return the recorded frame of each frame by the name of its image, -1 for none, and notes; None if no name is equal."""
     place_of = {name: place for place, name in enumerate(image_names)}
     places = np.array([place_of.get(frame.name, -1) for frame in frames], dtype=np.int64)
     matched = int(np.count_nonzero(places >= 0))
     if not matched:
         return None
     left_out = len(places) - matched
-    others = f"; {left_out} others are not among the recorded pictures, and are left out" if left_out else ""
-    return places, (f"{matched} annotated frames have the names of recorded pictures, and are matched by them{others}",)
+    others = f"; {left_out} others are not among the recorded images, and are left out" if left_out else ""
+    return places, (f"{matched} annotated frames have the names of recorded images, and are matched by them{others}",)
 
 
 def _stamps_of(frames: Sequence[FileFrame]) -> TimesNs | None:
-    """Return the stamp of each frame: stated, or in its picture's name; None if any frame has none."""
+    """Return the stamp of each frame: stated, or in its image's name; None if any frame has none."""
     if all(frame.stamp is not None for frame in frames):
         return np.array([frame.stamp for frame in frames], dtype=np.int64)
     names = [frame.name for frame in frames]
@@ -322,17 +322,17 @@ def _by_number(found: FileBoxes, source: str, count: int) -> tuple[Indices, tupl
 
 
 def _numbers_of(frames: Sequence[FileFrame], source: str) -> Indices:
-    """Return the number of each frame: stated, else in its picture's name.
+    """Return the number of each frame: stated, else in its image's name.
 
     Raises:
-        InputError: a picture's name has no number.
+        InputError: an image's name has no number.
     """
     groups = [_DIGITS.findall(frame.name) for frame in frames]
     for frame, found in zip(frames, groups, strict=True):
         if frame.number is None and not found:
             raise InputError(
-                f"{source}: the picture {frame.name!r} has neither a time nor a number in its name, so its recorded frame "
-                "is unknown; name the pictures by their stamps in nanoseconds"
+                f"{source}: the image {frame.name!r} has neither a time nor a number in its name, so its recorded frame "
+                "is unknown; name the images by their stamps in nanoseconds"
             )
     which = _counting_group([found for frame, found in zip(frames, groups, strict=True) if frame.number is None])
     numbers = [

@@ -1,4 +1,4 @@
-"""CameraInfo for the pictures of a recording: on the topic where viewers look for it, unless another one is there."""
+"""CameraInfo for the images of a recording: on the topic where viewers look for it, unless another one is there."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.topics import Topic, join_topics
 
 OWN_TOPIC = "/cocalib/camera_info"
-"""Where the topic beside the pictures holds other intrinsics."""
+"""Where the topic beside the images holds other intrinsics."""
 
 _TRANSPORTS = ("compressed", "compressedDepth", "ffmpeg", "foxglove", "theora", "zstd", "draco", "h264")
 _STAMP_PLACE = 4  # after the sequence number (ROS 1), or after the encapsulation (CDR)
@@ -47,9 +47,9 @@ def choose_topic(recording: Recording, camera: Camera, frame: str) -> ChosenTopi
     """Choose the topic for the intrinsics of a calibration.
 
     Args:
-        recording: with pictures.
+        recording: with images.
         camera: the intrinsics of the calibration.
-        frame: the pictures' frame.
+        frame: the images' frame.
     """
     assert recording.image_topic is not None
     name = topic_beside(recording.image_topic)
@@ -82,7 +82,7 @@ def _difference(topic: Topic, camera: Camera, frame: str) -> str:
                 return difference
             recorded = message.message("header").text("frame_id").lstrip("/")
             if recorded != frame:
-                return f"has the frame_id {recorded!r} and the pictures have {frame!r}"
+                return f"has the frame_id {recorded!r} and the images have {frame!r}"
     except RecordingError as error:
         return f"cannot be read ({error})"
     return ""
@@ -120,7 +120,7 @@ class InfoTemplate:
     Args:
         build: serialises.
         camera: the intrinsics.
-        frame: the pictures' frame.
+        frame: the images' frame.
     """
 
     def __init__(self, build: MessageBuilder, camera: Camera, frame: str) -> None:

@@ -1,4 +1,4 @@
-"""Write a recording again with its calibration: every message as it was, and what viewers need to draw returns on pictures."""
+"""Write a recording again with its calibration: every message as it was, and what viewers need to draw returns on images."""
 
 import json
 import struct
@@ -174,7 +174,7 @@ class Plan:
         frames: the frames of the sensors, with the transform to write.
         info: where the intrinsics are.
         calibration: to write.
-        stamp_offset: of the picture messages' stamp; None if they have none.
+        stamp_offset: of the image messages' stamp; None if they have none.
         as_reported: whether to write the returns as the radar reports them.
         corrected: whether to write them with the radar's errors taken out.
     """
@@ -265,7 +265,7 @@ class Additions:
         return StoredMessage(channel, data, log_time, log_time, number)
 
     def _stamp(self, message: StoredMessage) -> bytes:
-        """Return a picture's own stamp, which its intrinsics must share, in little-endian words."""
+        """Return an image's own stamp, which its intrinsics must share, in little-endian words."""
         place = self.plan.stamp_offset
         stamp = b"" if place is None else message.data[place : place + _STAMP.size]
         if len(stamp) < _STAMP.size:
@@ -318,14 +318,14 @@ def write_into_recording(
     """Write a recording again as MCAP, with a calibration. Memory is bounded whatever the recording's size.
 
     Args:
-        recording: open, with pictures; of ROS 1 or ROS 2.
+        recording: open, with images; of ROS 1 or ROS 2.
         file: the calibration of its radar and camera.
         out: the new file, written from front to back.
         version: of this program.
         progress: called with the number of messages done and their total.
 
     Raises:
-        InputError: it is no ROS recording, or the calibration is not of its pictures.
+        InputError: it is no ROS recording, or the calibration is not of its images.
         RecordingError: it can no longer be read.
     """
     original = _original(recording)
@@ -382,7 +382,7 @@ def _generation(recording: Recording, original: _Original) -> Literal[1, 2]:
 
 def _plan(recording: Recording, file: CalibrationFile) -> tuple[Plan, list[str]]:
     """Decide what to add, and say why."""
-    _require_same_pictures(recording, file)
+    _require_same_images(recording, file)
     frames, notes = _frames(recording, file)
     info = choose_topic(recording, file.calibration.camera, frames.camera)
     notes.extend(note for note in (info.note, _about_distortion(file), _about_players(recording)) if note)
@@ -414,7 +414,7 @@ def _frames(recording: Recording, file: CalibrationFile) -> tuple[SensorFrames, 
         notes.append(f"{recorded.unreadable} messages of {', '.join(recorded.topics)} cannot be read")
     why = ""
     if radar == camera:
-        why = f"the recording's pictures and returns have the same frame_id {radar!r}"
+        why = f"the recording's images and returns have the same frame_id {radar!r}"
     elif recording.radar_topic is not None and not recording.radar_frame:
         why = "the radar's messages name no frame"
     elif recording.radar_axes is not None:
@@ -425,19 +425,19 @@ def _frames(recording: Recording, file: CalibrationFile) -> tuple[SensorFrames, 
     return placed, [*notes, *placed.notes]
 
 
-def _require_same_pictures(recording: Recording, file: CalibrationFile) -> None:
+def _require_same_images(recording: Recording, file: CalibrationFile) -> None:
     camera = file.calibration.camera
     if recording.image_topic is None or not len(recording.image_times):
-        raise InputError(f"{recording.name}: has no pictures to draw returns on; give the recording of the camera too")
+        raise InputError(f"{recording.name}: has no images to draw returns on; give the recording of the camera too")
     try:
         image = recording.image_bytes(0)
     except RecordingError:
         return
     if (image.width_px, image.height_px) != (camera.width_px, camera.height_px):
         raise InputError(
-            f"{recording.name}: the pictures of {recording.image_topic} have {image.width_px} x {image.height_px} pixels, but "
+            f"{recording.name}: the images of {recording.image_topic} have {image.width_px} x {image.height_px} pixels, but "
             f"the calibration is of a camera with {camera.width_px} x {camera.height_px}; give the calibration of this camera, "
-            "or choose its pictures with --image-topic"
+            "or choose its images with --image-topic"
         )
 
 
@@ -445,8 +445,8 @@ def _about_distortion(file: CalibrationFile) -> str:
     if not file.calibration.camera.is_distorted:
         return ""
     return (
-        "the lens distorts: Foxglove straightens the pictures itself; RViz draws returns without distortion, so give its Camera "
-        "display rectified pictures (image_proc)"
+        "the lens distorts: Foxglove straightens the images itself; RViz draws returns without distortion, so give its Camera "
+        "display rectified images (image_proc)"
     )
 
 
@@ -519,14 +519,14 @@ def foxglove_layout(*, image_topic: str, info_topic: str, cloud_topics: Sequence
     """Return the layout as JSON.
 
     Args:
-        image_topic: the pictures.
+        image_topic: the images.
         info_topic: their intrinsics.
         cloud_topics: the returns to draw; the others of the recording are hidden.
         camera: the optical frame.
         radar: the radar's frame, which the 3D view follows.
     """
     image = {
-        "foxglovePanelTitle": "Radar returns on the picture",
+        "foxglovePanelTitle": "Radar returns on the image",
         "imageMode": {
             "imageTopic": image_topic,
             "calibrationTopic": info_topic,

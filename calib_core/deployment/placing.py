@@ -147,7 +147,7 @@ class SensorFrames:
     """The frames in which viewers draw.
 
     Attributes:
-        camera: the optical frame of the pictures.
+        camera: the optical frame of the images.
         radar: the frame of the returns, in the axes of the calibration.
         joint: the transform to write; None if the recording gives it already.
         notes: what the user must know.
@@ -167,7 +167,7 @@ def place_transform(
     Args:
         camera_from_radar: the calibration.
         radar: frame_id of the radar messages.
-        camera: frame_id of the pictures.
+        camera: frame_id of the images.
         frames: of the recording.
         own_radar_frame: why the returns need a frame of their own; "" if they do not.
     """

@@ -149,7 +149,7 @@ def clocks_apart(
 
 def _most_once_shifted(rays: Points3, points_m: Points3, pose: RigidTransform) -> int:
     """Return about how many pairs can agree if the pose is shifted and not turned, which is what a grid's step does to it."""
-    known = np.isfinite(rays).all(axis=1)  # the lens model has none outside its picture
+    known = np.isfinite(rays).all(axis=1)  # the lens model has none outside its image
     rays, turned_m = rays[known], points_m[known] @ pose.rotation.T
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     weights = 1.0 / np.linalg.norm(turned_m, axis=1)

@@ -1,4 +1,4 @@
-"""The uncertainty in the picture as a map: how far from the drawn place a point may really appear, over all of the image."""
+"""The uncertainty in the image as a map: how far from the drawn place a point may really appear, over all of the image."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ _SAME_PX = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UncertaintyMap:
-    """Where a point at one distance may appear, for a grid of places in the picture.
+    """Where a point at one distance may appear, for a grid of places in the image.
 
     Attributes:
         distance_m: of the point from the camera.
@@ -46,7 +46,7 @@ class UncertaintyMap:
 def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int = 49) -> UncertaintyMap:
     """Map the 95 % uncertainty of a reprojection over the image, for points at one distance from the camera.
 
-    Each pixel of the grid is carried along its ray to the distance, and the covariance of the pose from there into the picture.
+    Each pixel of the grid is carried along its ray to the distance, and the covariance of the pose from there into the image.
     It covers the pose; for a radar without elevation, what the pairs determine of it. The noise of a single radar position is
     not included.
 
@@ -91,7 +91,7 @@ def pixel_quantile(covariance_quantile: float) -> float:
 def picture_sigma_px(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance) -> float:
     """Return the standard deviation per axis [px] of a reprojection, root mean square over the inlier placements.
 
-    Pose and radar errors are uncertain together, and mostly cancel in the picture: a radar without elevation may be tilted by
+    Pose and radar errors are uncertain together, and mostly cancel in the image: a radar without elevation may be tilted by
     degrees, but where its returns appear is known to pixels. The noise of a single radar position is not included.
     """
     inliers = refined.inliers

@@ -1,8 +1,8 @@
-"""Plausibility of the input: units, picture and axes that look like something else than what was asked for.
+"""Plausibility of the input: units, image and axes that look like something else than what was asked for.
 
 A pose can be solved from ranges in millimetres, from columns and rows in the wrong order or from another frame's axes, and its
 residuals may look good. What gives them away is their size: a reflector is clicked between a metre and a hundred from the
-radar, inside the picture, and in front of the radar.
+radar, inside the image, and in front of the radar.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
 _SIDEWAYS_RAD = np.deg2rad(60.0)
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
-_PART_OF_PICTURE = 0.5
+_PART_OF_IMAGE = 0.5
 _LEAST_PAIRS = 8
 
 
@@ -83,7 +83,7 @@ def _pixels(ids: Sequence[str], pixels_px: Points2, camera: Camera) -> list[Data
             )
         ]
     reach_u, reach_v = (pixels_px.max(axis=0) / np.array(size)).tolist()
-    if len(ids) < _LEAST_PAIRS or max(reach_u, reach_v) >= _PART_OF_PICTURE:
+    if len(ids) < _LEAST_PAIRS or max(reach_u, reach_v) >= _PART_OF_IMAGE:
         return []
     return [DataWarning("pixels-suspected", {**image, "reach": (reach_u, reach_v)})]
 

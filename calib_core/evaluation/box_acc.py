@@ -35,7 +35,7 @@ AXES: dict[Axis, tuple[float, float, float]] = {
 _CHANCE_DEG = 10.0
 _GROUPS_S = (1.0, 2.0, 5.0, 10.0)
 _LEAST_GROUPS = 6
-_MARGIN = 1.1  # of the angle from the axis to the corner of the picture
+_MARGIN = 1.1  # of the angle from the axis to the corner of the image
 
 
 def box_figures(
@@ -223,7 +223,7 @@ def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -
 
 
 def _area_chance(counted: CountedReturns, camera: Camera) -> float:
-    """Return what returns at random pixels would score: the share of the picture that each one's own box covers."""
+    """Return what returns at random pixels would score: the share of the image that each one's own box covers."""
     last = np.array([camera.width_px, camera.height_px]) - 0.5
     low, high = np.clip(counted.boxes_px[:, :2], -0.5, last), np.clip(counted.boxes_px[:, 2:], -0.5, last)
     areas = np.nan_to_num(np.prod(high - low, axis=1)) / (camera.width_px * camera.height_px)

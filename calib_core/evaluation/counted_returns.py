@@ -58,7 +58,7 @@ class Sightings:
 
 @dataclass(frozen=True, slots=True)
 class Bearings:
-    """How a target's bearing in the picture follows from the radar's azimuth: azimuth + turn + parallax / range.
+    """How a target's bearing in the image follows from the radar's azimuth: azimuth + turn + parallax / range.
 
     Attributes:
         turn_rad: of the camera against the radar, about the vertical; positive to the left.
@@ -110,7 +110,7 @@ class Matches:
 
     Attributes:
         boxes: (s,) row of the table; -1 for none.
-        counts: (s,) whether it has a box, or would be in the picture: what the camera cannot see has no box.
+        counts: (s,) whether it has a box, or would be in the image: what the camera cannot see has no box.
         bearings: how the two sensors see the same target; None if nothing shows it, and everything counts.
     """
 

@@ -239,7 +239,7 @@ class BoxFigures:
         rule: which returns count and how they were matched, in one sentence.
         source: of the boxes.
         groups: number of groups of neighbouring frames that the standard error comes from.
-        area_chance: mean share of the picture that a target's box covers: what returns at random pixels would score.
+        area_chance: mean share of the image that a target's box covers: what returns at random pixels would score.
         targets: number of targets that were found.
         matched_targets: number of them that have boxes.
         returns: every return that counts; None in a file.

@@ -46,7 +46,7 @@ def residual_difference(a: ResidualFigures, b: ResidualFigures, *, lost_px: floa
     Args:
         a: of one calibration.
         b: of another, at the same clicks.
-        lost_px: what a residual counts where the reflector would be behind the camera, such as the picture's diagonal.
+        lost_px: what a residual counts where the reflector would be behind the camera, such as the image's diagonal.
     """
     lengths = [np.where(np.isfinite(one.distances_px), one.distances_px, lost_px) for one in (a, b)]
     groups = a.placements if len(a.placements) else np.arange(len(a.ids))

@@ -123,7 +123,7 @@ def _box_lines(figures: BoxFigures) -> list[str]:
     )
     rows.append(
         f"  chance: turned by 10 deg to either side {_percent(figures.chance)}; the boxes cover {_percent(figures.area_chance)} "
-        "of the picture"
+        "of the image"
     )
     rows.append(f"  {figures.rule}")
     return rows

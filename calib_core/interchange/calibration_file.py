@@ -231,9 +231,9 @@ class CalibrationFile:
         evidence: what the pose rests on, as the file states it; None if it states nothing.
         vehicle: what is stated of the vehicle and its sensors.
         corrected: the calibration that this one was made from, if its pose is for radar data as reported, without corrections.
-        aed_either_way_px: what `raw_data.aed_either_way` found through the lens, of a file for rectified pictures; else None.
+        aed_either_way_px: what `raw_data.aed_either_way` found through the lens, of a file for rectified images; else None.
         made_from_sha256: the SHA-256 of the calibration-1 file that this was made from, if something was changed on the way to
-            another format, such as the camera of rectified pictures; "" if nothing was.
+            another format, such as the camera of rectified images; "" if nothing was.
     """
 
     calibration: Calibration

@@ -27,13 +27,13 @@ from calib_core.interchange.trees.frame_tree import FrameTree
 
 _MAPS_NAME = "rectification.npz"
 _SAME_MATRIX_NOTE = (
-    "written for rectified pictures: undistorted with this same camera matrix, no distortion left; "
-    "wrong for pictures as the camera took them"
+    "written for rectified images: undistorted with this same camera matrix, no distortion left; "
+    "wrong for images as the camera took them"
 )
 _NEW_MATRIX_NOTE = (
-    f"written for rectified pictures with a camera matrix of their own (fx {{:.6g}}, fy {{:.6g}}, cx {{:.6g}}, cy {{:.6g}} px); "
-    f"make them with the maps in {_MAPS_NAME} beside this file: cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR); "
-    "if your pictures are already undistorted with the camera matrix that they were taken with, say so with --rectified "
+    f"written for rectified images with a camera matrix of their own (fx {{:.6g}}, fy {{:.6g}}, cx {{:.6g}}, cy {{:.6g}} px); "
+    f"make them with the maps in {_MAPS_NAME} beside this file: cv2.remap(image, map_x, map_y, cv2.INTER_LINEAR); "
+    "if your images are already undistorted with the camera matrix that they were taken with, say so with --rectified "
     "(on the page, tick the box)"
 )
 
@@ -141,8 +141,8 @@ def export(
         file: what to export.
         name: of a format that can be written.
         parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
-        rectified: the file is for pictures undistorted with this same camera matrix, no distortion left. Without it, "kitti"
-            and "nuscenes", which cannot store distortion, get the camera matrix of pictures rectified with maps of ours.
+        rectified: the file is for images undistorted with this same camera matrix, no distortion left. Without it, "kitti"
+            and "nuscenes", which cannot store distortion, get the camera matrix of images rectified with maps of ours.
         frames: the frame names to write; None for the calibration's own.
 
     Raises:
@@ -234,10 +234,10 @@ class _Prepared:
 
 
 def _prepared(file: CalibrationFile, chosen: Format, *, rectified: bool) -> _Prepared:
-    """Return the calibration as the format can hold it: that of rectified pictures if it stores no distortion.
+    """Return the calibration as the format can hold it: that of rectified images if it stores no distortion.
 
     Raises:
-        InputError: no rectified picture can be cut from this lens.
+        InputError: no rectified image can be cut from this lens.
     """
     camera = file.calibration.camera
     if not (chosen.is_for_rectified and camera.is_distorted):

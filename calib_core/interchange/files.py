@@ -127,7 +127,7 @@ def export(
         calibration: a result of the solver, or the content of a file.
         name: of the format, such as "tf2", "urdf", "kalibr", "opencv" or "kitti".
         frames: names of the two frames, for a result; None uses "radar" and "camera_optical".
-        rectified: the pictures are undistorted with this same camera matrix; see the notes of "kitti" and "nuscenes".
+        rectified: the images are undistorted with this same camera matrix; see the notes of "kitti" and "nuscenes".
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.

@@ -105,7 +105,7 @@ class StatedCheckPoint:
         radar_m: (3,) the point in the radar frame.
         camera_m: (3,) where it must be in the camera frame; None if only the pixel is stated.
         pixel_px: (2,) the pixel it must project to, through the lens; None if it is not stated.
-        rectified_px: (2,) its pixel in rectified pictures, through the camera matrix alone; None if it is not stated.
+        rectified_px: (2,) its pixel in rectified images, through the camera matrix alone; None if it is not stated.
     """
 
     radar_m: Vector3
@@ -136,7 +136,7 @@ class ImportedCalibration:
         notes: what reading it did with the numbers, one sentence each.
         faults: the contradictions in the file, one sentence each.
         file: everything else, if it is a calibration-1 file.
-        matrix_px: (3, 3) K of pictures whose size the file does not state; None if it has none, or states the size.
+        matrix_px: (3, 3) K of images whose size the file does not state; None if it has none, or states the size.
         lens_model: the lens model that belongs to matrix_px.
         distortion: its coefficients.
         evidence: what the pose rests on, as the file states it; None if it states nothing.
@@ -166,7 +166,7 @@ class ImportedCalibration:
     for_raw: bool = False
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
-        """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.
+        """Return the camera; one whose size the file does not state gets that of the images. None if there is none.
 
         Raises:
             ValueError: the matrix is not a camera's.
@@ -269,7 +269,7 @@ class Format:
 
     @property
     def is_for_rectified(self) -> bool:
-        """Whether its pictures must be rectified: it stores a camera matrix but no distortion."""
+        """Whether its images must be rectified: it stores a camera matrix but no distortion."""
         return self.camera == "matrix"
 
 

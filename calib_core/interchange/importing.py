@@ -372,7 +372,7 @@ def _camera(found: ImportedCalibration, given: Camera | None, *, source: str, re
 def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source: str) -> None:
     """Refuse a given camera that images the rays of the file's camera elsewhere.
 
-    A file with a camera matrix alone is for undistorted pictures; that matrix is compared.
+    A file with a camera matrix alone is for undistorted images; that matrix is compared.
 
     Raises:
         InputError: they image a ray more than half a pixel apart.
@@ -449,9 +449,9 @@ _GRID = 9
 
 
 def largest_difference_px(a: Camera, b: Camera) -> float:
-    """Return the largest distance [px] between the pixels of one ray, over the picture of the first camera.
+    """Return the largest distance [px] between the pixels of one ray, over the image of the first camera.
 
-    Infinite if the pictures have different sizes, or the second camera does not image a ray of the first.
+    Infinite if the images have different sizes, or the second camera does not image a ray of the first.
     """
     if (a.width_px, a.height_px) != (b.width_px, b.height_px):
         return float("inf")

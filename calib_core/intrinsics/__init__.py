@@ -1,14 +1,14 @@
-"""Calibrate a camera's lens from pictures of a board: K, distortion, and how well they are known."""
+"""Calibrate a camera's lens from images of a board: K, distortion, and how well they are known."""
 
 from calib_core.intrinsics.board import Board, BoardKind, board_of_size
-from calib_core.intrinsics.board_pictures import BoardCorners, BoardPictures, LeftOutPicture
+from calib_core.intrinsics.board_images import BoardCorners, BoardImages, LeftOutImage
 from calib_core.intrinsics.board_search import search_boards
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView, ModelTrial
 from calib_core.intrinsics.calibrating import calibrate_lens
 from calib_core.intrinsics.coverage import BoardSearch, Coverage, SearchProgress, view_coverage
-from calib_core.intrinsics.picture_maps import (
+from calib_core.intrinsics.image_maps import (
     MODEL_ERRORS_UNSEEN,
-    PictureGrid,
+    ImageGrid,
     ResidualField,
     projection_uncertainty,
     residual_field,
@@ -19,15 +19,15 @@ __all__ = [
     "MODEL_ERRORS_UNSEEN",
     "Board",
     "BoardCorners",
+    "BoardImages",
     "BoardKind",
-    "BoardPictures",
     "BoardSearch",
     "CalibratedLens",
     "Coverage",
-    "LeftOutPicture",
+    "ImageGrid",
+    "LeftOutImage",
     "LensView",
     "ModelTrial",
-    "PictureGrid",
     "ResidualField",
     "SearchProgress",
     "SplitDifference",

@@ -165,14 +165,14 @@ def adjust_robustly(state: LensState, stack: ViewStack, freedom: Freedom) -> Len
 
 
 _FOCAL_LENGTHS = (0.2, 0.26, 0.33, 0.42, 0.55, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0)
-"""Tried ones, as shares of the longer side of the picture; the poses fit well over a factor of 1.3."""
+"""Tried ones, as shares of the longer side of the image; the poses fit well over a factor of 1.3."""
 
 _POSE_STEPS = 4
 _VOTERS = 16
 
 
 def simple_camera(model: str, size_px: tuple[int, int], focal_px: float) -> Camera:
-    """Return a camera without distortion, whose principal point is in the middle of the picture."""
+    """Return a camera without distortion, whose principal point is in the middle of the image."""
     width, height = size_px
     matrix = np.array([[focal_px, 0.0, (width - 1) / 2.0], [0.0, focal_px, (height - 1) / 2.0], [0.0, 0.0, 1.0]])
     most = {"plumb_bob": 5}.get(model, LENS_MODELS[model].counts[-1])

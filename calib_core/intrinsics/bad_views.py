@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import Flags, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.intrinsics.adjustment import adjust, adjust_robustly, pose_views, typical_sigma
-from calib_core.intrinsics.board_pictures import BoardCorners
+from calib_core.intrinsics.board_images import BoardCorners
 from calib_core.intrinsics.linearization import BoardWarp, Freedom, LensState, ViewStack, residuals_of
 
 _ROUNDS = 4
@@ -24,7 +24,7 @@ _MIRROR_QUANTILE, _MIRROR_SPREADS = 0.8, 3.0
 _BLUR_RATIO, _BLUR_RESIDUAL_RATIO = 1.8, 1.3
 _LEAST_OTHERS = 3  # views that tell which of two mirror images is mirrored
 _STRETCH = 0.01
-_NO_POSE_SHARE = 0.2  # of the picture's longer side
+_NO_POSE_SHARE = 0.2  # of the image's longer side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,7 @@ def judge_views(
         views: of the board.
         stack: the same.
         state: a lens that most of them fit.
-        may_be_mirrored: whether the board is found in mirrored pictures too; one with markers is not.
+        may_be_mirrored: whether the board is found in mirrored images too; one with markers is not.
     """
     whole = stack
     for _ in range(_ROUNDS):
@@ -173,7 +173,7 @@ def _reasons(views: Sequence[BoardCorners], stack: ViewStack, fits: _Fits, *, ma
 def _exchanged(fits: _Fits, mirrored: _Fits) -> Flags:
     """Return which views (v,) are mirrored: their corners fit better with left and right exchanged, and then like the others.
 
-    A lens whose middle is that of the picture fits both alike, and where something else is not described, good views may fit
+    A lens whose middle is that of the image fits both alike, and where something else is not described, good views may fit
     better mirrored; so that as many of them as do raise the limit.
     """
     own, other = np.maximum(fits.rms_px, _FLOOR_PX), np.maximum(mirrored.rms_px, _FLOOR_PX)
@@ -187,7 +187,7 @@ def _exchanged(fits: _Fits, mirrored: _Fits) -> Flags:
 def _mirrored_twins(stack: ViewStack, fits: _Fits, exchanged: Flags) -> dict[int, tuple[int, float, float]]:
     """Return the mirrored one of each pair of mirror images: its twin, and how both fit the lens of all other views [px].
 
-    That two pictures are mirror images says that one is mirrored, also where the lens is so symmetric that it fits both.
+    That two images are mirror images says that one is mirrored, also where the lens is so symmetric that it fits both.
     """
     found: dict[int, tuple[int, float, float]] = {}
     for pair in mirror_twins(stack, fits.typical_px):
@@ -234,7 +234,7 @@ def _stretch(view: ViewStack) -> BoardWarp:
 
 
 _COPY_SHARE = (
-    0.7  # of the residuals; corners of two pictures taken apart differ by 1.4 times these, those of copies by less
+    0.7  # of the residuals; corners of two images taken apart differ by 1.4 times these, those of copies by less
 )
 _LEAST_COPY_PX = 0.05
 _FARTHEST_PX = 2.0

@@ -1,19 +1,19 @@
-"""Find a board in a picture; say how sharp it is, or which checkerboard it is if it is another one.
+"""Find a board in an image; say how sharp it is, or which checkerboard it is if it is another one.
 
-Checkerboards are found quickly in a smaller picture, then to a fraction of a pixel in the full one. OpenCV's older detector is
+Checkerboards are found quickly in a smaller image, then to a fraction of a pixel in the full one. OpenCV's older detector is
 ten times as fast as its newer one and nearly as robust; the newer one is asked where the older one finds nothing: in a small
-picture always, in a larger one only if a quick look shows squares, for most frames show no board. Both number the corners row
+image always, in a larger one only if a quick look shows squares, for most frames show no board. Both number the corners row
 by row, but may begin at any end; a grid that is mirrored by its numbers is turned over, so that a board seen from its front
 always has a right-handed frame.
 
 Boards with markers are ChArUco boards and Kalibr's AprilGrid; a part of the board suffices. Facts that decide about ids: OpenCV
-draws the AprilTags of family 36h11 turned by 180 degrees against AprilTag's own pictures, which Kalibr prints. So the corner
-that OpenCV calls the first is the lower right one on a Kalibr grid. Grids printed with OpenCV's pictures exist too; the
+draws the AprilTags of family 36h11 turned by 180 degrees against AprilTag's own images, which Kalibr prints. So the corner
+that OpenCV calls the first is the lower right one on a Kalibr grid. Grids printed with OpenCV's images exist too; the
 orientation that makes a plane of the whole grid is taken.
 
 Corners to a fraction of a pixel: the window around each follows the distance to its neighbours. Where four squares meet, the
 brightness has a saddle point. A first estimate is where the gradients point along the lines through it (OpenCV's cornerSubPix);
-then the saddle point of a quadratic that is fitted to the smoothed picture, which uses all of the light around the corner
+then the saddle point of a quadratic that is fitted to the smoothed image, which uses all of the light around the corner
 instead of the edges alone.
 """
 
@@ -26,18 +26,18 @@ from calib_core.arrays import Flags, Indices, Points2, Values
 from calib_core.intrinsics.board import Board
 
 
-def find_board(picture: np.ndarray, board: Board) -> tuple[Indices, Points2] | None:
-    """Find a board: ids (n,) of its corners in the picture, ascending, and their pixels (n, 2); None if it is not there.
+def find_board(image: np.ndarray, board: Board) -> tuple[Indices, Points2] | None:
+    """Find a board: ids (n,) of its corners in the image, ascending, and their pixels (n, 2); None if it is not there.
 
     A checkerboard must be seen as a whole; of the others a part suffices.
 
     Args:
-        picture: uint8 (h, w, 3), blue first, or (h, w).
+        image: uint8 (h, w, 3), blue first, or (h, w).
         board: which board.
     """
     import cv2
 
-    grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     if board.kind == "checkerboard":
         corners = find_checkerboard(grey, board.columns, board.rows)
         return None if corners is None else (np.arange(len(corners)), corners)
@@ -48,18 +48,18 @@ _WIDTH_PX = 640
 _SEEDS = ((3, 3), (4, 3), (5, 4))
 
 
-def board_in(picture: np.ndarray, board: Board) -> tuple[int, int] | None:
-    """Return the inner corners of another checkerboard in a picture: along its longer and its shorter side; None without one.
+def board_in(image: np.ndarray, board: Board) -> tuple[int, int] | None:
+    """Return the inner corners of another checkerboard in an image: along its longer and its shorter side; None without one.
 
     Args:
-        picture: uint8 (h, w, 3), blue first, or (h, w).
+        image: uint8 (h, w, 3), blue first, or (h, w).
         board: the one that was looked for and is not there.
     """
     import cv2
 
     if board.kind != "checkerboard":
         return None
-    grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     factor = min(1.0, _WIDTH_PX / grey.shape[1])
     small = cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     sizes = []
@@ -83,13 +83,13 @@ _LEAST_EDGES = 4
 _SMALL_STEP = 1e-3  # over the length of an edge
 
 
-def blur_px(picture: np.ndarray, corner_ids: Indices, pixels_px: Points2, board: Board) -> float:
+def blur_px(image: np.ndarray, corner_ids: Indices, pixels_px: Points2, board: Board) -> float:
     """Return the width of the edges between black and white, as the standard deviation of a Gaussian [px].
 
     Motion blurs the edges across it; of the two directions of the board the wider one counts. NaN where nothing can be measured.
 
     Args:
-        picture: uint8 (h, w, 3), blue first, or (h, w).
+        image: uint8 (h, w, 3), blue first, or (h, w).
         corner_ids: (n,) corners of the board in it.
         pixels_px: (n, 2) where they are.
         board: which board.
@@ -107,14 +107,14 @@ def blur_px(picture: np.ndarray, corner_ids: Indices, pixels_px: Points2, board:
     widths: list[float] = []
     for direction in (~across, across):
         chosen = seen & direction
-        found = _widths(picture, pixels_px[rows[chosen]], steps[chosen], _free_share(board))
+        found = _widths(image, pixels_px[rows[chosen]], steps[chosen], _free_share(board))
         if len(found) >= _LEAST_EDGES:
             widths.append(float(np.median(found)))
     return max(widths, default=float("nan"))
 
 
 def _steps_across(board: Board, corner_ids: Indices, pixels_px: Points2) -> np.ndarray | None:
-    """Return how far a step in the board's plane, across each edge and as long as it, is in the picture: (k, 2) [px]."""
+    """Return how far a step in the board's plane, across each edge and as long as it, is in the image: (k, 2) [px]."""
     import cv2
 
     plane_m = board.corners_m[:, :2]
@@ -144,11 +144,11 @@ def _free_share(board: Board) -> float:
     return min(0.18, 0.45 * board.marker_m / board.square_m)
 
 
-def _widths(picture: np.ndarray, ends: np.ndarray, steps: np.ndarray, share: float) -> np.ndarray:
+def _widths(image: np.ndarray, ends: np.ndarray, steps: np.ndarray, share: float) -> np.ndarray:
     """Return the widths of edges whose contrast suffices: (<= k,) [px].
 
     Args:
-        picture: that they are in.
+        image: that they are in.
         ends: (k, 2, 2) their ends.
         steps: (k, 2) across them in the board's plane, which a tilt shortens.
         share: of these steps that is plain on either side.
@@ -170,7 +170,7 @@ def _widths(picture: np.ndarray, ends: np.ndarray, steps: np.ndarray, share: flo
         + (share_of_step[:, None] * across)[:, None, :, None] * steps[:, None, None]
     ).astype(np.float32)
     flat = at.reshape(len(ends), -1, 2)
-    values = cv2.remap(picture, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values = cv2.remap(image, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     if values.ndim == 3:
         values = values.mean(axis=2)
     profiles = values.reshape(len(ends), len(_ALONG), _SAMPLES).astype(np.float64).mean(axis=1)
@@ -542,7 +542,7 @@ def _turned(board: Board, numbers: Indices, sides: np.ndarray) -> np.ndarray | N
 
 
 def _refined_marked(grey: np.ndarray, board: Board, ids: Indices, pixels_px: Points2) -> tuple[Indices, Points2] | None:
-    """Refine corners, and leave out those that move away, leave the picture, or do not lie where the others say."""
+    """Refine corners, and leave out those that move away, leave the image, or do not lie where the others say."""
     order = np.argsort(ids)
     ids, pixels_px = ids[order], pixels_px[order]
     height, width = grey.shape
@@ -575,7 +575,7 @@ def _plain_spacing(board: Board, ids: Indices, pixels_px: Points2) -> Values:
 
 
 def _where_others_say(plane_m: Points2, corners_px: Points2) -> tuple[Flags, Points2]:
-    """Return which corners (n,) lie near the smooth map from the board to the picture that most agree on, and all by it."""
+    """Return which corners (n,) lie near the smooth map from the board to the image that most agree on, and all by it."""
     middle, size = plane_m.mean(axis=0), np.ptp(plane_m, axis=0).max()
     x, y = ((plane_m - middle) / max(size, 1e-9)).T
     degree = 3 if len(x) >= _CORNERS_FOR_CUBIC else 1 if len(x) < _CORNERS_FOR_SQUARES else 2

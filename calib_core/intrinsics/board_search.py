@@ -1,4 +1,4 @@
-"""Look for a board in many pictures, first all over a recording and then where it is, and choose those to calibrate with."""
+"""Look for a board in many images, first all over a recording and then where it is, and choose those to calibrate with."""
 
 import os
 from collections import Counter
@@ -12,20 +12,20 @@ from calib_core.arrays import Points2, Values
 from calib_core.errors import CalibrationError
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
-from calib_core.intrinsics.board_pictures import BoardCorners, BoardPictures, LeftOutPicture
+from calib_core.intrinsics.board_images import BoardCorners, BoardImages, LeftOutImage
 from calib_core.intrinsics.coverage import BoardSearch, SearchProgress, view_coverage
 from calib_core.measurements import NS_PER_S, TimeNs, Unsolvable
 
-_LISTED = 200  # of so few pictures, each one without a board is named
+_LISTED = 200  # of so few images, each one without a board is named
 _ASKED_FOR_OTHERS = 13
 _BEFORE_OTHERS, _OTHERS_ENOUGH = 24, 6
 _FEW_SHARE, _OTHERS_FACTOR = 0.25, 3
-_PICTURES_PER_CORE = 4
+_IMAGES_PER_CORE = 4
 _OTHER_SIZES_SHARE = 0.2
 
 
 def search_boards(
-    pictures: BoardPictures,
+    images: BoardImages,
     board: Board,
     *,
     known: tuple[BoardCorners, ...] = (),
@@ -35,17 +35,17 @@ def search_boards(
 ) -> BoardSearch | Unsolvable:
     """Look for a board and choose the views to calibrate with.
 
-    Of a few hundred pictures each is searched; of a long recording some all over it, and then more where the board is.
+    Of a few hundred images each is searched; of a long recording some all over it, and then more where the board is.
 
     Args:
-        pictures: where to look.
+        images: where to look.
         board: what to look for.
         known: views of an earlier search, which are not looked for again.
-        searched: numbers of the pictures that the earlier search looked at.
+        searched: numbers of the images that the earlier search looked at.
         progress: called from this thread while the search runs.
-        stopped: asked between pictures; once it is true the search ends with what was found.
+        stopped: asked between images; once it is true the search ends with what was found.
     """
-    search = _Search(pictures, board, known, searched)
+    search = _Search(images, board, known, searched)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         for _ in search.run(pool):
             if progress is not None:
@@ -59,21 +59,21 @@ class _Search:
     """A search, and what it has found so far."""
 
     def __init__(
-        self, pictures: BoardPictures, board: Board, known: Sequence[BoardCorners], searched: Collection[int]
+        self, images: BoardImages, board: Board, known: Sequence[BoardCorners], searched: Collection[int]
     ) -> None:
-        self._pictures = pictures
+        self._images = images
         self._board = board
         self._views = {view.index: view for view in known}
         self._seen = {*searched, *self._views}
         self._unreadable: dict[int, str] = {}
         self._sizes: Counter[tuple[int, int]] = Counter(view.size_px for view in known)
-        self._order = PictureOrder(len(pictures), pictures.time_ns)
+        self._order = ImageOrder(len(images), images.time_ns)
         self._complete = False
-        self._shown: dict[int, tuple[int, int] | None] = {}  # other boards in pictures that were asked for them
+        self._shown: dict[int, tuple[int, int] | None] = {}  # other boards in images that were asked for them
 
     def run(self, pool: ThreadPoolExecutor) -> Iterator[None]:
-        """Search picture after picture; yields after each."""
-        step = _PICTURES_PER_CORE * (os.cpu_count() or 1)
+        """Search image after image; yields after each."""
+        step = _IMAGES_PER_CORE * (os.cpu_count() or 1)
         while True:
             batch = self._order.next_batch(self._views)
             if not batch:
@@ -89,24 +89,24 @@ class _Search:
         self._complete = True
 
     def _is_of_other_boards(self) -> bool:
-        """Return whether the first pictures show another board, so that the rest need not be searched."""
+        """Return whether the first images show another board, so that the rest need not be searched."""
         if self._shown or self._views or len(self._seen) < _BEFORE_OTHERS:
             return False
         sizes = Counter(self._other_boards(self._empty()).values())
         return bool(sizes) and sizes.most_common(1)[0][1] >= _OTHERS_ENOUGH
 
     def _look(self, index: int) -> tuple[tuple[int, int], BoardCorners | None] | str:
-        """Look at a picture: its size and what is in it, or why it cannot be read."""
+        """Look at an image: its size and what is in it, or why it cannot be read."""
         try:
-            picture = self._pictures.picture(index)
+            image = self._images.image(index)
         except CalibrationError as error:
             return str(error)
-        size_px = (picture.shape[1], picture.shape[0])
-        found = find_board(picture, self._board)
+        size_px = (image.shape[1], image.shape[0])
+        found = find_board(image, self._board)
         if found is None:
             return size_px, None
-        name, time = self._pictures.name(index), self._pictures.time_ns(index)
-        return size_px, BoardCorners(index, name, time, size_px, *found, blur_px(picture, *found, self._board))
+        name, time = self._images.name(index), self._images.time_ns(index)
+        return size_px, BoardCorners(index, name, time, size_px, *found, blur_px(image, *found, self._board))
 
     def _take(self, index: int, found: tuple[tuple[int, int], BoardCorners | None] | str) -> None:
         self._seen.add(index)
@@ -142,9 +142,7 @@ class _Search:
             return self._mixed_sizes()
         views, left_out = chosen_views(fitting, self._board)
         left_out += [
-            LeftOutPicture(
-                view.index, view.name, f"it has {_size_text(view.size_px)} pixels, not {_size_text(size_px)}"
-            )
+            LeftOutImage(view.index, view.name, f"it has {_size_text(view.size_px)} pixels, not {_size_text(size_px)}")
             for view in self._sorted_views()
             if view.size_px != size_px
         ]
@@ -161,7 +159,7 @@ class _Search:
         )
 
     def _is_rather_of_another_board(self) -> bool:
-        """Return whether another board is in far more pictures: the few views are a part of it, or wrong."""
+        """Return whether another board is in far more images: the few views are a part of it, or wrong."""
         count = len(self._views)
         if self._board.kind != "checkerboard" or count > _FEW_SHARE * len(self._seen):
             return False
@@ -171,25 +169,25 @@ class _Search:
     def _sorted_views(self) -> tuple[BoardCorners, ...]:
         return tuple(self._views[index] for index in sorted(self._views))
 
-    def _faults(self) -> list[LeftOutPicture]:
+    def _faults(self) -> list[LeftOutImage]:
         return [
-            LeftOutPicture(index, self._pictures.name(index), f"it cannot be read: {why}")
+            LeftOutImage(index, self._images.name(index), f"it cannot be read: {why}")
             for index, why in sorted(self._unreadable.items())
         ]
 
     def _empty(self) -> list[int]:
         return sorted(self._seen - set(self._views) - set(self._unreadable))
 
-    def _without_board(self) -> list[LeftOutPicture]:
-        """Name the pictures without the board, if they are few enough to have been taken of one."""
-        if len(self._pictures) > _LISTED:
+    def _without_board(self) -> list[LeftOutImage]:
+        """Name the images without the board, if they are few enough to have been taken of one."""
+        if len(self._images) > _LISTED:
             return []
         empty = self._empty()
         shown = self._other_boards(empty)
         return [
-            LeftOutPicture(
+            LeftOutImage(
                 index,
-                self._pictures.name(index),
+                self._images.name(index),
                 f"it shows a board of {_size_text(shown[index])} inner corners"
                 if index in shown
                 else f"no {self._board.text} is seen in it as a whole"
@@ -200,11 +198,11 @@ class _Search:
         ]
 
     def _other_boards(self, indices: Sequence[int]) -> dict[int, tuple[int, int]]:
-        """Return which checkerboard some pictures show instead, by their numbers."""
+        """Return which checkerboard some images show instead, by their numbers."""
         asked = indices[:: max(1, len(indices) // _ASKED_FOR_OTHERS)]
         if not self._shown.keys() & set(indices):
             for index in asked:
-                self._shown[index] = board_in(self._pictures.picture(index), self._board)
+                self._shown[index] = board_in(self._images.image(index), self._board)
         return {index: shown for index, shown in self._shown.items() if shown}
 
     def _no_board(self) -> Unsolvable:
@@ -212,7 +210,7 @@ class _Search:
             return Unsolvable("no-pictures")
         if self._unreadable and len(self._unreadable) == len(self._seen):
             why = next(iter(self._unreadable.values()))
-            return Unsolvable("unreadable", {"pictures": len(self._seen), "why": why})
+            return Unsolvable("unreadable", {"images": len(self._seen), "why": why})
         sizes = Counter(self._other_boards(self._empty()).values())
         seen = {"board": self._board, "searched": len(self._seen), "views": len(self._views)}
         if not sizes:
@@ -235,27 +233,27 @@ _FINEST_S = 0.3
 _USUAL_RATE_HZ = 30.0
 
 
-class PictureOrder:
-    """Batches of pictures to search, each chosen by what was found before. The order does not depend on how fast anything is."""
+class ImageOrder:
+    """Batches of images to search, each chosen by what was found before. The order does not depend on how fast anything is."""
 
     def __init__(self, count: int, time_ns: Callable[[int], TimeNs | None]) -> None:
         """Set up the order.
 
         Args:
-            count: of pictures.
-            time_ns: of a picture by its number; None if nothing says.
+            count: of images.
+            time_ns: of an image by its number; None if nothing says.
         """
         self._count = count
         self._asked: set[int] = set()
         self._finest = max(1, round(_FINEST_S * _rate_hz(count, time_ns)))
         self.total = count if count <= _EVERY_ONE else _FIRST_PASS
-        """Pictures to search, as far as known."""
+        """Images to search, as far as known."""
 
     def next_batch(self, found: Collection[int]) -> list[int]:
-        """Return the numbers of the pictures to search next; none at the end.
+        """Return the numbers of the images to search next; none at the end.
 
         Args:
-            found: numbers of the pictures in which the board was found so far.
+            found: numbers of the images in which the board was found so far.
         """
         if not self._asked:
             batch = self._everywhere()
@@ -266,14 +264,14 @@ class PictureOrder:
         return batch
 
     def _everywhere(self) -> list[int]:
-        """Return pictures all over the recording, such that the first ones are far apart."""
+        """Return images all over the recording, such that the first ones are far apart."""
         if self._count <= _EVERY_ONE:
             return list(range(self._count))
         even = np.linspace(0, self._count - 1, _FIRST_PASS).round().astype(int)
         return list(dict.fromkeys(even[_far_apart(len(even))].tolist()))
 
     def _between(self, asked: list[int], found: set[int]) -> list[int]:
-        """Return the middles of the gaps beside pictures with the board, the widest first, as far as the number allows."""
+        """Return the middles of the gaps beside images with the board, the widest first, as far as the number allows."""
         gaps = [
             (after - before, (before + after) // 2)
             for before, after in pairwise(asked)
@@ -301,25 +299,25 @@ def _far_apart(count: int) -> np.ndarray:
 MOST_VIEWS = 60
 _SHARP_SHARE = 0.3
 _BLURRED_FACTOR, _BLURRED_PX = 1.6, 0.8
-_SAME_SHARE, _SAME_PX = 0.004, 2.0  # of the width of the picture
+_SAME_SHARE, _SAME_PX = 0.004, 2.0  # of the width of the image
 _SHARPER_FACTOR = 1.05
 
 
-def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[BoardCorners], list[LeftOutPicture]]:
+def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[BoardCorners], list[LeftOutImage]]:
     """Return the views to calibrate with, in order of their numbers, and the others with the reason.
 
     Args:
-        views: of one size of picture, in order of their numbers.
+        views: of one size of image, in order of their numbers.
         board: that they show.
     """
-    left_out: list[LeftOutPicture] = []
+    left_out: list[LeftOutImage] = []
     sharp_px = _usual_blur_px(views)
     limit_px = max(_BLURRED_FACTOR * sharp_px, sharp_px + _BLURRED_PX)
     sharp = []
     for view in views:
         if view.blur_px > limit_px:
             reason = f"blurred: edges are {view.blur_px:.1f} px wide, those of the others {sharp_px:.1f} px"
-            left_out.append(LeftOutPicture(view.index, view.name, reason))
+            left_out.append(LeftOutImage(view.index, view.name, reason))
         else:
             sharp.append(view)
     outlines = np.array([outline_px(view, board) for view in sharp]).reshape(len(sharp), -1)
@@ -329,13 +327,13 @@ def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[Boar
         for place, row in enumerate(kept):
             if place not in different:
                 reason = f"not needed: {MOST_VIEWS} views that differ more from one another are used"
-                left_out.append(LeftOutPicture(sharp[row].index, sharp[row].name, reason, spare=True))
+                left_out.append(LeftOutImage(sharp[row].index, sharp[row].name, reason, spare=True))
         kept = [row for place, row in enumerate(kept) if place in different]
     return [sharp[row] for row in kept], left_out
 
 
 def outline_px(view: BoardCorners, board: Board) -> Points2:
-    """Return where the four outer corners of the board are in the picture, or would be: (4, 2) [px]."""
+    """Return where the four outer corners of the board are in the image, or would be: (4, 2) [px]."""
     import cv2
 
     plane_m = board.corners_m[:, :2]
@@ -355,9 +353,7 @@ def _usual_blur_px(views: Sequence[BoardCorners]) -> float:
     return float(np.quantile(known, _SHARP_SHARE)) if len(known) else float("inf")
 
 
-def _without_duplicates(
-    views: Sequence[BoardCorners], outlines: np.ndarray, left_out: list[LeftOutPicture]
-) -> list[int]:
+def _without_duplicates(views: Sequence[BoardCorners], outlines: np.ndarray, left_out: list[LeftOutImage]) -> list[int]:
     """Return the rows of the views that are no repetition of a sharper one, ascending; name the others."""
     sharpest_first = sorted(range(len(views)), key=lambda row: (np.nan_to_num(views[row].blur_px, nan=1e9), row))
     kept: list[int] = []
@@ -373,7 +369,7 @@ def _without_duplicates(
         else:
             sharper = views[row].blur_px > _SHARPER_FACTOR * views[same].blur_px
             reason = f"the same view as {views[same].name}{', which is sharper' if sharper else ''}"
-            left_out.append(LeftOutPicture(views[row].index, views[row].name, reason, spare=True))
+            left_out.append(LeftOutImage(views[row].index, views[row].name, reason, spare=True))
     return sorted(kept)
 
 

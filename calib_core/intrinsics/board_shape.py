@@ -66,7 +66,7 @@ class RowSkew:
     """How views are skewed.
 
     Attributes:
-        skews_px: (v,) how far the picture's last row is displaced against the first, as far as a pose does not explain it.
+        skews_px: (v,) how far the image's last row is displaced against the first, as far as a pose does not explain it.
         share: of the squared residuals that skews explain.
         other_share: that an equally free smooth pattern explains, which motion does not make.
     """

@@ -6,7 +6,7 @@ from calib_core.arrays import Flags, Points2, Points3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics.board import Board
-from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
+from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 from calib_core.results import DataWarning
 
 
@@ -15,7 +15,7 @@ class LensView:
     """A view of the board, as the calibrated camera explains it.
 
     Attributes:
-        corners: what was found in the picture.
+        corners: what was found in the image.
         camera_from_board: the board's pose.
         residuals_px: (n, 2) projected minus found corners [px].
         used: (n,) which corners were used.
@@ -66,7 +66,7 @@ class CalibratedLens:
         board: with which they were found.
         board_shape_m: (k, 3) the corners of the board as estimated, by id; as stated if nothing speaks against it.
         views: used ones, in order of their numbers.
-        left_out: pictures that were not used, with the reason.
+        left_out: images that were not used, with the reason.
         rms_px: root mean square distance of all used corners.
         held_out_rms_px: the same for views left out one after the other; NaN if not determined.
         trials: the models that were tried, the simplest first.
@@ -78,7 +78,7 @@ class CalibratedLens:
     board: Board
     board_shape_m: Points3
     views: tuple[LensView, ...]
-    left_out: tuple[LeftOutPicture, ...]
+    left_out: tuple[LeftOutImage, ...]
     rms_px: float
     held_out_rms_px: float
     trials: tuple[ModelTrial, ...] = ()

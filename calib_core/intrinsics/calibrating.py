@@ -10,7 +10,7 @@ from calib_core.arrays import Points3, Values
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.intrinsics.adjustment import SharedCovariance, reduced, shared_covariance, start, typical_sigma
 from calib_core.intrinsics.bad_views import JudgedViews, judge_views
-from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
+from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 from calib_core.intrinsics.board_shape import RowSkew, ShapeTest, row_skew, try_shapes
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
 from calib_core.intrinsics.coverage import BoardSearch
@@ -33,7 +33,7 @@ from calib_core.intrinsics.model_choice import (
     fit_model,
     folds_back,
     held_out_squares,
-    picture_places,
+    image_places,
     view_folds,
 )
 from calib_core.measurements import Unsolvable
@@ -58,7 +58,7 @@ class _Used:
     stack: ViewStack
     board_m: Points3
     model: LensChoice
-    left_out: tuple[LeftOutPicture, ...]
+    left_out: tuple[LeftOutImage, ...]
     starts: Mapping[str, LensState]
 
     def choose(self, warp: BoardWarp) -> ChosenModel | str:
@@ -125,7 +125,7 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     faults = [_fault(view, board_m, search.size_px) for view in search.views]
     views = [view for view, fault in zip(search.views, faults, strict=True) if not fault]
     left_out = [
-        LeftOutPicture(view.index, view.name, fault) for view, fault in zip(search.views, faults, strict=True) if fault
+        LeftOutImage(view.index, view.name, fault) for view, fault in zip(search.views, faults, strict=True) if fault
     ]
     if len(views) < _LEAST_VIEWS:
         return _too_few(len(views), left_out)
@@ -135,13 +135,13 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
         return Unsolvable("no-lens", {"views": len(views), "why": "no focal length explains them", "model": model})
     judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
     reasons = zip(views, judged.reasons, strict=True)
-    left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
+    left_out += [LeftOutImage(view.index, view.name, reason) for view, reason in reasons if reason]
     views = [view for view, reason in zip(views, judged.reasons, strict=True) if not reason]
     if len(views) < _LEAST_VIEWS:
         return _too_few(len(views), left_out)
     stack = judged.stack.of(judged.kept)
     starts = {state.camera.model: state.of(judged.kept) for state in states}
-    every = sorted((*search.left_out, *left_out), key=lambda picture: picture.index)
+    every = sorted((*search.left_out, *left_out), key=lambda image: image.index)
     return _Used(tuple(views), stack, board_m, model, tuple(every), starts)
 
 
@@ -153,14 +153,14 @@ def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> st
         return f"only {len(view.corner_ids)} corners of the board; a view needs {_LEAST_CORNERS}"
     if not np.isfinite(view.pixels_px).all():
         return "some of its corners are nowhere"
-    for places, where in ((board_m[view.corner_ids, :2], "of the board"), (view.pixels_px, "in the picture")):
+    for places, where in ((board_m[view.corner_ids, :2], "of the board"), (view.pixels_px, "in the image")):
         spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
         if spread[1] <= _LINE_SHARE * spread[0]:
             return f"its corners are on one line {where}"
     return ""
 
 
-def _too_few(count: int, left_out: Sequence[LeftOutPicture]) -> Unsolvable:
+def _too_few(count: int, left_out: Sequence[LeftOutImage]) -> Unsolvable:
     return Unsolvable("few-views", {"views": count, "needed": _LEAST_VIEWS, "left_out": tuple(left_out)})
 
 
@@ -289,7 +289,7 @@ def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[D
     """Say what is doubtful about a lens and the views that it was calibrated with."""
     yield from _about_views(camera, stack)
     yield from _about_numbers(camera, rms_px)
-    outside = folds_back(camera, picture_places(stack.size_px))
+    outside = folds_back(camera, image_places(stack.size_px))
     if outside.any() and camera.lens.is_perspective:
         yield DataWarning("lens-folds-back", {"share": float(outside.mean())})
 
@@ -318,7 +318,7 @@ def _about_numbers(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
 
 
 def _covered_share(stack: ViewStack) -> float:
-    """Return which share of the picture lies in the convex hull of all corners."""
+    """Return which share of the image lies in the convex hull of all corners."""
     found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
     hull = cv2.convexHull(found.astype(np.float32))
     return float(cv2.contourArea(hull) / (stack.size_px[0] * stack.size_px[1]))

@@ -1,4 +1,4 @@
-"""What views of a board cover: the picture, tilts and distances; and which view is missing, in words."""
+"""What views of a board cover: the image, tilts and distances; and which view is missing, in words."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ import numpy as np
 
 from calib_core.arrays import Counts, Vector3, frozen_array
 from calib_core.intrinsics.board import Board
-from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
+from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 
 _CELLS = (6, 8)
 _FINE = (36, 48)
-_ROUGH_FOCAL_LENGTH = 0.9  # over the width of the picture; tilts need no better one
+_ROUGH_FOCAL_LENGTH = 0.9  # over the width of the image; tilts need no better one
 _SQUARE_ON_DEG = 12.0
-_NEAR, _FAR = 0.20, 0.07  # share of the picture that the board fills
+_NEAR, _FAR = 0.20, 0.07  # share of the image that the board fills
 _VIEWS_WANTED = 12
 _PER_TILT, _PER_DISTANCE = 2, 2
 _SHARE_WANTED = 0.6
@@ -36,10 +36,10 @@ class Coverage:
     """What views of a board cover.
 
     Attributes:
-        counts: (rows, columns) corners in each cell of the picture.
-        share: of the picture that was covered by the board, 0 to 1.
+        counts: (rows, columns) corners in each cell of the image.
+        share: of the image that was covered by the board, 0 to 1.
         tilts: number of views by where the board faces: "left", "right", "up", "down", or "square on".
-        distances: number of views by how much of the picture the board fills: "near", "middle", "far".
+        distances: number of views by how much of the image the board fills: "near", "middle", "far".
         missing: sentences that say which view is missing and how to film it; none if nothing is.
     """
 
@@ -59,7 +59,7 @@ def view_coverage(views: Sequence[BoardCorners], board: Board, size_px: tuple[in
     Args:
         views: of the board.
         board: that they show.
-        size_px: width and height of the pictures.
+        size_px: width and height of the images.
     """
     counts, covered = np.zeros(_CELLS, dtype=np.int64), np.zeros(_FINE, dtype=bool)
     tilts, distances = dict.fromkeys((*_TILTS, "square on"), 0), dict.fromkeys(("near", "middle", "far"), 0)
@@ -85,7 +85,7 @@ class _ViewShare:
     tilts: tuple[str, ...]
 
 
-@lru_cache(maxsize=1024)  # a search asks for the coverage of all its views after each picture
+@lru_cache(maxsize=1024)  # a search asks for the coverage of all its views after each image
 def _view_share(view: BoardCorners, board: Board, size_px: tuple[int, int]) -> _ViewShare:
     shares = (view.pixels_px + 0.5) / np.array(size_px)
     column, row = np.clip((shares * (_CELLS[1], _CELLS[0])).astype(int), 0, (_CELLS[1] - 1, _CELLS[0] - 1)).T
@@ -95,7 +95,7 @@ def _view_share(view: BoardCorners, board: Board, size_px: tuple[int, int]) -> _
 
 
 def _cover(shares: np.ndarray, covered: np.ndarray) -> float:
-    """Mark the hull of corners (n, 2) as covered; return its share of the picture."""
+    """Mark the hull of corners (n, 2) as covered; return its share of the image."""
     import cv2
 
     hull = cv2.convexHull((shares * (_FINE[1], _FINE[0])).astype(np.float32))
@@ -152,19 +152,19 @@ def _missing(
         sentences.append(f"{count} views of the board, 15 to 30 are better: film it from more directions")
     empty = [_PLACES[row][column] for row in range(3) for column in range(3) if not _third(covered, row, column).any()]
     if empty:
-        sentences.append(f"nothing in the {_list_text(empty)} of the picture: hold the board there, tilted")
+        sentences.append(f"nothing in the {_list_text(empty)} of the image: hold the board there, tilted")
     elif share < _SHARE_WANTED:
         sentences.append(
-            f"the board was in {100.0 * share:.0f} % of the picture: hold it nearer to the borders and corners"
+            f"the board was in {100.0 * share:.0f} % of the image: hold it nearer to the borders and corners"
         )
     for name, how in _TILTS.items():
         if tilts[name] < _PER_TILT:
             number = "no view" if not tilts[name] else "only one view"
             sentences.append(f"{number} in which the board faces {name}: {how}")
     if distances["near"] < _PER_DISTANCE:
-        sentences.append("no near views: let the board fill a third of the picture or more")
+        sentences.append("no near views: let the board fill a third of the image or more")
     if not distances["far"] and not distances["middle"]:
-        sentences.append("no views from farther away: step back until the board fills a tenth of the picture")
+        sentences.append("no views from farther away: step back until the board fills a tenth of the image")
     return sentences
 
 
@@ -182,18 +182,18 @@ class SearchProgress:
     """How far a search is.
 
     Attributes:
-        searched: pictures so far.
-        total: pictures to search, as far as known; it grows where the board is found in a long recording.
+        searched: images so far.
+        total: images to search, as far as known; it grows where the board is found in a long recording.
         views: in which the board was found so far, in order of their numbers.
         left_out: those not used so far.
         coverage: of these views; None before the first.
-        indices: numbers of the pictures that were searched, ascending.
+        indices: numbers of the images that were searched, ascending.
     """
 
     searched: int
     total: int
     views: tuple[BoardCorners, ...] = ()
-    left_out: tuple[LeftOutPicture, ...] = ()
+    left_out: tuple[LeftOutImage, ...] = ()
     coverage: Coverage | None = None
     indices: tuple[int, ...] = ()
 
@@ -204,10 +204,10 @@ class BoardSearch:
 
     Attributes:
         board: what was looked for.
-        size_px: width and height of the pictures.
+        size_px: width and height of the images.
         views: those to calibrate with, in order of their numbers.
         left_out: the others in which the board is, or was expected, with the reason.
-        searched: how many pictures were looked at.
+        searched: how many images were looked at.
         complete: whether all were; False after a cancelled search.
         indices: their numbers, ascending.
         found: all views that were found, the ones left out included, for a search that goes on from here.
@@ -216,7 +216,7 @@ class BoardSearch:
     board: Board
     size_px: tuple[int, int]
     views: tuple[BoardCorners, ...]
-    left_out: tuple[LeftOutPicture, ...]
+    left_out: tuple[LeftOutImage, ...]
     searched: int
     complete: bool = True
     indices: tuple[int, ...] = ()
@@ -224,5 +224,5 @@ class BoardSearch:
 
     @property
     def coverage(self) -> Coverage:
-        """What of the picture, and which tilts and distances, the views cover."""
+        """What of the image, and which tilts and distances, the views cover."""
         return view_coverage(self.views, self.board, self.size_px)

@@ -12,7 +12,7 @@ import numpy as np
 from calib_core.arrays import Flags, Points3, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
-from calib_core.intrinsics.board_pictures import BoardCorners
+from calib_core.intrinsics.board_images import BoardCorners
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,7 @@ class ViewStack:
         pixels_px: (v, 2, m) where they were found.
         corner_ids: (v, m) which corners of the board.
         weights: (v, m) of each corner; 0 for none.
-        size_px: width and height of the pictures.
+        size_px: width and height of the images.
     """
 
     board_m: np.ndarray
@@ -114,7 +114,7 @@ class ViewStack:
         return np.asarray(squares / np.maximum(counted.sum(axis=1), 1))
 
     def mirrored(self) -> "ViewStack":
-        """Return the views as they would be in pictures whose left and right are exchanged."""
+        """Return the views as they would be in images whose left and right are exchanged."""
         pixels = self.pixels_px.copy()
         pixels[:, 0] = self.size_px[0] - 1 - pixels[:, 0]
         return replace(self, pixels_px=pixels)
@@ -128,7 +128,7 @@ def stack_views(
     Args:
         views: of the board.
         board_m: (n, 3) its corners, by id.
-        size_px: width and height of the pictures.
+        size_px: width and height of the images.
         used: for each view (n,) which corners have a weight; all if None.
     """
     most = max(len(view.corner_ids) for view in views)

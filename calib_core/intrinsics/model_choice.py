@@ -208,14 +208,14 @@ def held_out_squares(state: LensState, stack: ViewStack, freedom: Freedom, folds
 _PLACES = 24
 
 
-def picture_places(size_px: tuple[int, int], columns: int = _PLACES, rows: int = _PLACES) -> Points2:
-    """Return places all over a picture, its edges included: (rows * columns, 2) [px]."""
+def image_places(size_px: tuple[int, int], columns: int = _PLACES, rows: int = _PLACES) -> Points2:
+    """Return places all over an image, its edges included: (rows * columns, 2) [px]."""
     x, y = np.meshgrid(np.linspace(0, size_px[0] - 1, columns), np.linspace(0, size_px[1] - 1, rows))
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
 def folds_back(camera: Camera, pixels_px: Points2) -> Flags:
-    """Return at which pixels (n, 2) the lens has no ray, or one along which the picture runs backwards."""
+    """Return at which pixels (n, 2) the lens has no ray, or one along which the image runs backwards."""
     rays = camera.rays(pixels_px)
     wrong = ~np.isfinite(rays).all(axis=1)
     with np.errstate(all="ignore"):
@@ -228,11 +228,11 @@ def folds_where_seen(camera: Camera, stack: ViewStack) -> str:
     """Say if the distortion folds back within the circle about the principal point that the corners reach; "" if not."""
     found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
     middle = camera.matrix_px[:2, 2]
-    places = picture_places(stack.size_px)
+    places = image_places(stack.size_px)
     reach = np.linalg.norm(found - middle, axis=1).max()
     inside = places[np.linalg.norm(places - middle, axis=1) <= reach]
     if not len(inside):
-        return "its principal point is outside the picture"
+        return "its principal point is outside the image"
     if folds_back(camera, inside).any():
         return "its distortion folds back where corners were found"
     return ""

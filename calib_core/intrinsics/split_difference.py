@@ -9,8 +9,8 @@ from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
 from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.image_maps import far_point_slopes, found_pixels, grid_covariance, image_grid
 from calib_core.intrinsics.linearization import Freedom, LensState, ViewStack, linearize, stack_views
-from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance, picture_grid
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 8
@@ -21,7 +21,7 @@ _TURN_STEPS = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SplitDifference:
-    """Two lenses from two halves of the views, compared over the part of the picture in which corners were found.
+    """Two lenses from two halves of the views, compared over the part of the image in which corners were found.
 
     Attributes:
         split: how the views were divided, such as "near and far views".
@@ -55,7 +55,7 @@ def split_difference(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = 
     """Calibrate two halves of the views separately, in two ways, and return the comparison that differs more.
 
     Every other view, and near against far views: the latter sees errors that depend on the distance or on the size of the
-    board in the picture, which every other view does not.
+    board in the image, which every other view does not.
 
     Args:
         lens: with its views.
@@ -81,7 +81,7 @@ def _compared(lens: CalibratedLens, text: str, half: Flags, columns: int, rows: 
     shifts = np.stack([view.camera_from_board.translation_m for view in lens.views])
     state = LensState(lens.camera, rotations, shifts)
     found_px = found_pixels(lens)
-    x_px, y_px, places = picture_grid(lens.camera, columns, rows)
+    x_px, y_px, places = image_grid(lens.camera, columns, rows)
     first, first_matrix = _half(state, stack, half)
     second, second_matrix = _half(state, stack, ~half)
     expected = grid_covariance(lens.camera, first_matrix + second_matrix, places, found_px).trace(axis1=1, axis2=2)

@@ -1,17 +1,17 @@
-"""Proposals: where in the pictures the reflector stood, found by the machine for a person to confirm."""
+"""Proposals: where in the images the reflector stood, found by the machine for a person to confirm."""
 
 from calib_core.proposing.automatic import AutomaticClicks, automatic_clicks
 from calib_core.proposing.dwell_views import DwellView, ViewProgress, dwell_views
-from calib_core.proposing.picture_candidates import PictureCandidate
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.proposals import Proposal, Proposals
 from calib_core.proposing.proposing import proposals_of
-from calib_core.proposing.still_pictures import FrameSource
+from calib_core.proposing.still_images import FrameSource
 
 __all__ = [
     "AutomaticClicks",
     "DwellView",
     "FrameSource",
-    "PictureCandidate",
+    "ImageCandidate",
     "Proposal",
     "Proposals",
     "ViewProgress",

@@ -1,6 +1,6 @@
 """The apex of a trihedral corner reflector near a given pixel, with its own covariance, or the reason why there is none.
 
-Three sheets meet in the apex, so the picture shows three sectors of different brightness, each below 180 deg. Discs of several
+Three sheets meet in the apex, so the image shows three sectors of different brightness, each below 180 deg. Discs of several
 sizes propose pixels that look so (`score_sectors`), a fit with blurred boundaries gives the apex below a pixel (`fit_sectors`),
 and the disc grows while the fit holds. The given pixel limits the search and enters no estimate. `is_corner` says which fits of
 three sectors show the inner corner of a reflector, and not an edge, a line, a tip, an X or texture.
@@ -15,7 +15,7 @@ import numpy as np
 from calib_core.arrays import Matrix22, Values, Vector2, Vector3, frozen_array
 
 _PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
-"""How much the picture is reduced, and the radius of the disc there [px]."""
+"""How much the image is reduced, and the radius of the disc there [px]."""
 
 _GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))
 _MARGIN_PX = 48
@@ -32,14 +32,14 @@ _RIVAL = 0.6
 
 _FITTED, _BLUR, _MOVED, _FLOOR_PX2 = 3.4, 0.009, 0.14, 0.015
 """How the covariance follows from the fit's, the blur's square, the square of the last move, and what is always added: fitted
-once to 560 simulated pictures (`python -m benchmarks.apex` measures the coverage on others)."""
+once to 560 simulated images (`python -m benchmarks.apex` measures the coverage on others)."""
 
 _FEW_PIXELS_PX, _FEW_PIXELS_PX2 = 4.0, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectorFit:
-    """A fit, in the pixels of the picture it was made in.
+    """A fit, in the pixels of the image it was made in.
 
     Attributes:
         apex_px: (2,) where the sectors meet.
@@ -82,7 +82,7 @@ class SectorFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Apex:
-    """The apex of a reflector in a picture.
+    """The apex of a reflector in an image.
 
     Attributes:
         pixel_px: (2,) column and row; (0, 0) is the centre of the top-left pixel.
@@ -121,7 +121,7 @@ class NoApex:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Reduced:
-    """A part of the picture, reduced: its pixel (0, 0) is at `corner_px` of the full one."""
+    """A part of the image, reduced: its pixel (0, 0) is at `corner_px` of the full one."""
 
     grey: np.ndarray
     factor: int
@@ -145,7 +145,7 @@ class _Proposal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """A fit in pixels of the full picture, and how far the apex moved when the disc last grew."""
+    """A fit in pixels of the full image, and how far the apex moved when the disc last grew."""
 
     fit: SectorFit
     pixel_px: Vector2
@@ -166,7 +166,7 @@ def find_apex(
     """
     near_px = np.asarray(near_px, dtype=np.float64)
     if not (np.all(near_px >= -reach_px) and np.all(near_px <= np.array(image.shape[1::-1]) + reach_px)):
-        return NoApex("the given pixel lies outside the picture")
+        return NoApex("the given pixel lies outside the image")
     levels = _reduced(image, near_px, reach_px)
     proposals = _proposals(levels, near_px, reach_px)
     found = [one for proposal in proposals if (one := _grown(levels, proposal)) is not None]
@@ -364,14 +364,14 @@ def fit_sectors(
     """Fit apex, directions, blur and grey levels to the disc around a first apex.
 
     Args:
-        grey: (h, w) the picture.
+        grey: (h, w) the image.
         apex_px: (2,) where to begin; the disc is centred on the nearest pixel.
         starts_rad: (3,) where the sectors begin, ascending.
         radius_px: of the disc.
         blur_px: where to begin.
 
     Returns:
-        None if the disc leaves the picture or the apex leaves the disc.
+        None if the disc leaves the image or the apex leaves the disc.
     """
     disc = _disc(grey, apex_px, radius_px)
     if disc is None:
@@ -562,10 +562,10 @@ def _angles_within(fit: SectorFit, limits: _Limits) -> bool:
 
 
 def half_turn_correlation(grey: np.ndarray, fit: SectorFit) -> float:
-    """Return the correlation of the disc around the fitted apex with itself turned by 180 deg; 1 if it leaves the picture.
+    """Return the correlation of the disc around the fitted apex with itself turned by 180 deg; 1 if it leaves the image.
 
     Args:
-        grey: (h, w) the picture of the fit.
+        grey: (h, w) the image of the fit.
         fit: the fit.
     """
     half = int(np.ceil(fit.radius_px))
@@ -640,7 +640,7 @@ def _wedge_kernels(radius_px: float) -> np.ndarray:
 
 
 def score_sectors(grey: np.ndarray, radius_px: float) -> SectorScores:
-    """Score each pixel whose disc lies inside the picture.
+    """Score each pixel whose disc lies inside the image.
 
     Args:
         grey: (h + 2 n, w + 2 n) float32, with n the radius rounded up.
@@ -652,8 +652,8 @@ def score_sectors(grey: np.ndarray, radius_px: float) -> SectorScores:
     half = kernels.shape[1] // 2
     grey = grey - grey.mean()
 
-    def summed(picture: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-        return cv2.filter2D(picture, cv2.CV_32F, kernel)[half:-half, half:-half]
+    def summed(image: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+        return cv2.filter2D(image, cv2.CV_32F, kernel)[half:-half, half:-half]
 
     areas = kernels.sum(axis=(1, 2))
     sums = np.stack([summed(grey, kernel) for kernel in kernels])

@@ -8,8 +8,8 @@ import numpy as np
 from calib_core.arrays import Indices
 from calib_core.errors import CalibrationError
 from calib_core.proposing.apex import Apex, find_apex
-from calib_core.proposing.picture_candidates import PictureCandidate, surroundings_of
-from calib_core.proposing.still_pictures import FrameSource, in_light_of, stack_median
+from calib_core.proposing.image_candidates import ImageCandidate, surroundings_of
+from calib_core.proposing.still_images import FrameSource, in_light_of, stack_median
 
 _REACHES = (0.45, 0.25)
 """How far from where it is expected an apex is searched, in widths of the reflector: the nearer where two corners rival."""
@@ -22,55 +22,53 @@ _ABOVE_BLOB, _BLOB_SIGMA = 0.2, 0.22
 """How far above a blob's centre the apex lies on average, and its standard deviation per axis, in widths of the reflector."""
 _MOST = 8
 _KEPT, _KEPT_PX = 1.6, 32.0
-"""How much of the picture around a candidate is kept: so many widths of the reflector, and so many pixels more."""
+"""How much of the image around a candidate is kept: so many widths of the reflector, and so many pixels more."""
 
 
-def full_picture(numbers: Indices, frames: FrameSource) -> np.ndarray | None:
+def full_image(numbers: Indices, frames: FrameSource) -> np.ndarray | None:
     """Return the median of a few frames of a dwell at full resolution: (h, w, 3) uint8; None if none can be read.
 
     Args:
         numbers: of the frames.
         frames: of the camera.
     """
-    pictures: list[np.ndarray] = []
+    images: list[np.ndarray] = []
     for number in numbers.tolist():
         try:
-            pictures.append(frames.image(number))
+            images.append(frames.image(number))
         except CalibrationError:
             continue
-    if not pictures:
+    if not images:
         return None
-    middle = pictures[len(pictures) // 2]
-    return stack_median([in_light_of(middle, picture) for picture in pictures])
+    middle = images[len(images) // 2]
+    return stack_median([in_light_of(middle, image) for image in images])
 
 
-def with_apexes(
-    candidates: Sequence[PictureCandidate], picture: np.ndarray, width_px: float
-) -> tuple[PictureCandidate, ...]:
+def with_apexes(candidates: Sequence[ImageCandidate], image: np.ndarray, width_px: float) -> tuple[ImageCandidate, ...]:
     """Move each candidate to the apex near it, if one is seen; two that share an apex become one. Those with an apex gain.
 
     Args:
-        candidates: in pixels of the full picture, the strongest first.
-        picture: (h, w, 3) uint8, full.
+        candidates: in pixels of the full image, the strongest first.
+        image: (h, w, 3) uint8, full.
         width_px: of the reflector there.
     """
-    found: list[PictureCandidate] = []
+    found: list[ImageCandidate] = []
     least = _LEAST_SHARE * max((one.strength for one in candidates), default=0.0)
     for place, candidate in enumerate(candidates):
         tried = place < _TRIED and candidate.strength >= least
-        moved = _at_apex(candidate, picture, width_px, tried=tried)
+        moved = _at_apex(candidate, image, width_px, tried=tried)
         if all(float(np.hypot(*(moved.pixel_px - other.pixel_px))) > 0.3 * width_px for other in found):
             found.append(moved)
     found.sort(key=lambda one: -one.strength)
     half_px = _KEPT * width_px + _KEPT_PX
-    return tuple(replace(one, surroundings=surroundings_of(picture, one.pixel_px, half_px)) for one in found[:_MOST])
+    return tuple(replace(one, surroundings=surroundings_of(image, one.pixel_px, half_px)) for one in found[:_MOST])
 
 
-def _at_apex(candidate: PictureCandidate, picture: np.ndarray, width_px: float, *, tried: bool) -> PictureCandidate:
+def _at_apex(candidate: ImageCandidate, image: np.ndarray, width_px: float, *, tried: bool) -> ImageCandidate:
     centre_px = candidate.pixel_px - np.array([0.0, _ABOVE_BLOB * width_px])
     for reach in _REACHES if tried else ():
         reach_px = max(_LEAST_REACH_PX, reach * width_px)
-        apex = find_apex(picture, centre_px, reach_px=reach_px, size_px=width_px)
+        apex = find_apex(image, centre_px, reach_px=reach_px, size_px=width_px)
         if isinstance(apex, Apex):
             gained = _APEX_GAIN * candidate.strength
             return replace(candidate, pixel_px=apex.pixel_px, sigma_px=apex.sigma_px, strength=gained, has_apex=True)

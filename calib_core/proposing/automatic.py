@@ -1,4 +1,4 @@
-"""Automatic clicks: the proposals taken as they are, if picture and radar agree far beyond chance; otherwise none."""
+"""Automatic clicks: the proposals taken as they are, if image and radar agree far beyond chance; otherwise none."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ LEAST_WHOLE_CONFIDENCE = 0.9
 LEAST_SCORE = 25.0
 """Least score of the pose: logarithm of how much better than chance it explains the candidates.
 
-Set on simulated recordings of development: of 650 pairs of one recording's radar and another's pictures the best reached 22.
+Set on simulated recordings of development: of 650 pairs of one recording's radar and another's images the best reached 22.
 Pairs drawn later with the threshold as it is are not independent of these, as they repeat the same 40 recordings;
 benchmarks/proposing/accuracy.md has those of recordings that nobody had looked at.
 """
@@ -54,7 +54,7 @@ class AutomaticClicks:
 def automatic_clicks(
     proposals: Proposals, views: Sequence[DwellView], camera: Camera, options: CalibrationOptions
 ) -> AutomaticClicks | Unsolvable:
-    """Take the proposals as clicks, if picture and radar agree so well that a person is hardly needed.
+    """Take the proposals as clicks, if image and radar agree so well that a person is hardly needed.
 
     Args:
         proposals: of these views, with nothing confirmed.

@@ -1,4 +1,4 @@
-"""Candidate rays: what pictures and radar say of each dwell, as arrays, with the odds before any pose is known."""
+"""Candidate rays: what images and radar say of each dwell, as arrays, with the odds before any pose is known."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from calib_core.estimation.measurement_model import OWN_SIGMA_RAD, is_flat
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.dwell_views import DwellView
-from calib_core.proposing.picture_candidates import PictureCandidate
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.radar import cartesian_jacobian, polar_from_cartesian
 
 _NONE = -1.5
@@ -37,7 +37,7 @@ _REPEATED_PX = 6.0
 _REPEATED_SHARE, _GATHERED_SHARE = 0.3, 0.4
 """Shares of the wrong candidates that lie where other dwells have one too, and near to where they gather."""
 _GATHERED = 0.05
-"""Width of such a gathering over that of the picture."""
+"""Width of such a gathering over that of the image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ class CandidateRays:
         return len(self.missing)
 
     def with_radar_of(self, rows: Indices) -> "CandidateRays":
-        """Return the same pictures, with the radar positions of other dwells (n,)."""
+        """Return the same images, with the radar positions of other dwells (n,)."""
         return replace(
             self,
             positions_radar_m=self.positions_radar_m[rows],
@@ -105,7 +105,7 @@ class CandidateRays:
 
 @dataclass(frozen=True, slots=True)
 class _Choice:
-    """One candidate of a dwell: a place in the picture, or a confirmed click."""
+    """One candidate of a dwell: a place in the image, or a confirmed click."""
 
     u_px: float
     v_px: float
@@ -209,8 +209,8 @@ def _within(click: ReflectorClick, view: DwellView) -> bool:
     return view.placement.start <= click.image_time <= view.placement.end
 
 
-def _odds(candidates: Sequence[PictureCandidate]) -> Values:
-    """Return how probably each candidate is the reflector, by what the picture shows (k,)."""
+def _odds(candidates: Sequence[ImageCandidate]) -> Values:
+    """Return how probably each candidate is the reflector, by what the image shows (k,)."""
     if not candidates:
         return np.zeros(0)
     strength = np.array([max(one.strength, 1e-6) for one in candidates])
@@ -229,7 +229,7 @@ def _rays(pixels: Points2, camera: Camera) -> tuple[Points3, Values]:
 
 
 def _tangents(rays: np.ndarray) -> np.ndarray:
-    """Return two unit vectors (..., 2, 3) across each unit ray (..., 3): about right and down in the picture."""
+    """Return two unit vectors (..., 2, 3) across each unit ray (..., 3): about right and down in the image."""
     down = np.array([0.0, 1.0, 0.0])
     right = np.cross(down, rays)
     length = np.linalg.norm(right, axis=-1, keepdims=True)

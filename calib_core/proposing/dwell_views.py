@@ -14,24 +14,24 @@ from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import TimeNs
 from calib_core.proposing.apex import Apex, find_apex
-from calib_core.proposing.apex_refinement import full_picture, with_apexes
-from calib_core.proposing.picture_candidates import PictureCandidate, blobs
-from calib_core.proposing.still_pictures import (
+from calib_core.proposing.apex_refinement import full_image, with_apexes
+from calib_core.proposing.image_candidates import ImageCandidate, blobs
+from calib_core.proposing.still_images import (
     FrameSource,
-    StillPicture,
+    StillImage,
     channel_gains,
     frames_within,
     in_same_light,
     local_light,
     seen_frames,
     stack_median,
-    still_pictures,
+    still_images,
 )
 
 _SETTLED = 9
 """Once so many dwells are seen, further ones hardly change what is said about one of them."""
 _REMEMBERED = 24
-"""Dwells whose still pictures are kept in memory, the last ones."""
+"""Dwells whose still images are kept in memory, the last ones."""
 _NEAREST_M = 0.3
 
 
@@ -43,12 +43,12 @@ class DwellView:
         placement: when and where the radar saw something stand still.
         frames: (k,) numbers of the frames that were looked at; empty if the camera recorded none.
         image_time: stamp of the frame in which a person is shown the proposal.
-        picture: (h, w, 3) uint8, the median of those frames, reduced; empty without frames, and forgotten after many dwells.
-        factor: width of the full picture over that of `picture`.
+        image: (h, w, 3) uint8, the median of those frames, reduced; empty without frames, and forgotten after many dwells.
+        factor: width of the full image over that of `image`.
         candidates: places that changed, the strongest first.
-        stills: the same picture for each set of placements that stood together; one if no other stood meanwhile.
-        width_px: of the reflector at that range, in the full picture.
-        clear: numbers of the few frames that are most like `picture`: nobody walks past in them.
+        stills: the same image for each set of placements that stood together; one if no other stood meanwhile.
+        width_px: of the reflector at that range, in the full image.
+        clear: numbers of the few frames that are most like `image`: nobody walks past in them.
         change: (k, h, w) uint8, how far each pixel of the k stills lies from what the other dwells show there.
         change_without: (l, h, w) uint8, the same of other dwells while those stood that stood meanwhile, but not this one.
     """
@@ -56,10 +56,10 @@ class DwellView:
     placement: Placement
     frames: Indices
     image_time: TimeNs
-    picture: np.ndarray
+    image: np.ndarray
     factor: float
-    candidates: tuple[PictureCandidate, ...] = ()
-    stills: tuple[StillPicture, ...] = ()
+    candidates: tuple[ImageCandidate, ...] = ()
+    stills: tuple[StillImage, ...] = ()
     width_px: float = float("nan")
     clear: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     change: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
@@ -72,7 +72,7 @@ class DwellView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewProgress:
-    """How far the pictures are looked at.
+    """How far the images are looked at.
 
     Attributes:
         done: dwells with candidates.
@@ -94,7 +94,7 @@ def dwell_views(
     progress: Callable[[ViewProgress], None] | None = None,
     stopped: Callable[[], bool] | None = None,
 ) -> tuple[DwellView, ...]:
-    """Look at the pictures of every dwell, and find what changed in each.
+    """Look at the images of every dwell, and find what changed in each.
 
     Args:
         placements: as the radar shows them.
@@ -117,12 +117,12 @@ def dwell_views(
             done += 1
             if progress is not None:
                 progress(ViewProgress(done, len(placements), tuple(views)))
-        views[:-_REMEMBERED] = [_without_pictures(view) for view in views[:-_REMEMBERED]]
+        views[:-_REMEMBERED] = [_without_images(view) for view in views[:-_REMEMBERED]]
     return tuple(views)
 
 
 def reflector_width_px(placement: Placement, camera: Camera, reflector_m: float) -> float:
-    """Return how wide the reflector is in the full picture at the range of a placement.
+    """Return how wide the reflector is in the full image at the range of a placement.
 
     Args:
         placement: of the radar.
@@ -138,29 +138,29 @@ def _seen(number: int, placements: Sequence[Placement], frames: FrameSource, wid
     placement = placements[number]
     seen = seen_frames(frames_within(placement, frames.image_times), frames)
     middle = TimeNs((placement.start + placement.end) // 2)
-    if not seen.pictures:
+    if not seen.images:
         empty = np.zeros((0, 0, 3), np.uint8)
         return DwellView(placement, seen.numbers, middle, empty, 1.0, width_px=width_px)
-    stills = still_pictures(number, placements, seen, frames.image_times)
-    picture = stills[0].picture if len(stills) == 1 else stack_median(seen.pictures)
-    clear = seen.clearest(picture)
+    stills = still_images(number, placements, seen, frames.image_times)
+    image = stills[0].image if len(stills) == 1 else stack_median(seen.images)
+    clear = seen.clearest(image)
     shown = clear[int(np.argmin(np.abs(frames.image_times[clear] - middle)))]
     image_time = TimeNs(int(frames.image_times[shown]))
     return DwellView(
-        placement, seen.numbers, image_time, picture, seen.factor, stills=stills, width_px=width_px, clear=clear
+        placement, seen.numbers, image_time, image, seen.factor, stills=stills, width_px=width_px, clear=clear
     )
 
 
 def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
     """Find what differs from the other dwells nearest in time."""
     view = views[number]
-    stills = [still for other in views for still in other.stills if still.picture.shape == view.picture.shape]
+    stills = [still for other in views for still in other.stills if still.image.shape == view.image.shape]
     others = nearest_others(number, view.image_time, stills)
     if not view.stills or len(others) < _LEAST_OTHERS:
         return view
     at_once = frozenset().union(*(still.standing for still in view.stills)) - {number}
     without = [still for still in others if still.standing & at_once]
-    usual = _Usual.of(view.stills[0].picture, others)
+    usual = _Usual.of(view.stills[0].image, others)
     return with_blobs(replace(view, change=usual.changes_of(view.stills), change_without=usual.changes_of(without)))
 
 
@@ -176,7 +176,7 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
 
     Args:
         view: of the dwell.
-        pixel_px: (2,) of the full picture, on the thing.
+        pixel_px: (2,) of the full image, on the thing.
     """
     if not view.change.size:
         return view.width_px
@@ -188,7 +188,7 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
 
 
 def has_changed(view: DwellView, pixel_px: Vector2) -> bool:
-    """Return whether something of any width changed at a pixel (2,) of the full picture."""
+    """Return whether something of any width changed at a pixel (2,) of the full image."""
     return bool(view.change.size) and bool(_shown(view, pixel_px)[1].max() > _LEAST_SIGMAS)
 
 
@@ -219,25 +219,25 @@ def _shown_at(view: DwellView, middle: Indices, width_px: float) -> float:
 def _with_candidates(number: int, views: Sequence[DwellView], frames: FrameSource) -> DwellView:
     """Find what changed, and the apexes there at full resolution."""
     view = _with_blobs(number, views)
-    picture = full_picture(view.clear, frames) if view.candidates else None
-    if picture is None:
+    image = full_image(view.clear, frames) if view.candidates else None
+    if image is None:
         return view
-    return replace(view, candidates=with_apexes(view.candidates, picture, view.width_px))
+    return replace(view, candidates=with_apexes(view.candidates, image, view.width_px))
 
 
-def _without_pictures(view: DwellView) -> DwellView:
+def _without_images(view: DwellView) -> DwellView:
     """Forget what no later dwell is compared with."""
-    return replace(view, picture=view.picture[:0], stills=()) if view.stills else view
+    return replace(view, image=view.image[:0], stills=()) if view.stills else view
 
 
-def _full(candidate: PictureCandidate, factor: float) -> PictureCandidate:
+def _full(candidate: ImageCandidate, factor: float) -> ImageCandidate:
     pixel_px = (candidate.pixel_px + 0.5) * factor - 0.5
     return replace(candidate, pixel_px=pixel_px, sigma_px=candidate.sigma_px * factor)
 
 
 _OTHERS = 9
 _LEAST_OTHERS = 2
-"""Other still pictures that are needed to say what changed."""
+"""Other still images that are needed to say what changed."""
 _LEVELS_PER_GREY = 64.0
 _FLOOR_GREY = 3.0
 """Scatter of a pixel at least: compression and sensor."""
@@ -249,7 +249,7 @@ _WIDEST, _WIDTHS, _NARROWEST_PX = 6.0, 25, 4.0
 _STANDS_OUT, _LEAST_SIGMAS = 1.5, 1.0
 """Another width is taken if it stands out that many times more, differs by that factor, and stands out at all."""
 _SURROUNDINGS = 4.0
-"""How much of the picture around a place its width is judged by, in widths."""
+"""How much of the image around a place its width is judged by, in widths."""
 _RING = 1.2
 """Weight of the mean around the square: what is larger than a reflector, such as a person, cancels."""
 _PART, _PART_COUNTS = 0.6, 0.8
@@ -262,8 +262,8 @@ _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
 
 
-def nearest_others(number: int, time: TimeNs, stills: Iterable[StillPicture]) -> list[StillPicture]:
-    """Return the still pictures nearest in time in which a placement did not stand; at most nine.
+def nearest_others(number: int, time: TimeNs, stills: Iterable[StillImage]) -> list[StillImage]:
+    """Return the still images nearest in time in which a placement did not stand; at most nine.
 
     Args:
         number: of the placement.
@@ -278,12 +278,12 @@ def nearest_others(number: int, time: TimeNs, stills: Iterable[StillPicture]) ->
 def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.ndarray:
     """Return how strongly each place changed at one size: (h, w) float32, in standard deviations.
 
-    Only what is in all pictures of the dwell counts, and what changed while it did not stand is not its own.
+    Only what is in all images of the dwell counts, and what changed while it did not stand is not its own.
 
     Args:
-        change: (k, h, w) of the dwell's pictures, at least one.
+        change: (k, h, w) of the dwell's images, at least one.
         without: (l, h, w) of those without it.
-        width_px: of the reflector in these pictures.
+        width_px: of the reflector in these images.
     """
     response: np.ndarray = np.min([_of_size(one, width_px) for one in change], axis=0)
     for one in without:
@@ -293,10 +293,10 @@ def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.nd
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Usual:
-    """What the scene looks like without the placement, in the light of its picture.
+    """What the scene looks like without the placement, in the light of its image.
 
     Attributes:
-        reference: (h, w, 3) uint8, the picture whose light it is.
+        reference: (h, w, 3) uint8, the image whose light it is.
         median: (h, w, 3) float32 [grey levels].
         scatter: (h, w, 3) float32, standard deviation [grey levels].
     """
@@ -306,11 +306,11 @@ class _Usual:
     scatter: np.ndarray
 
     @classmethod
-    def of(cls, reference: np.ndarray, others: Sequence[StillPicture]) -> "_Usual":
+    def of(cls, reference: np.ndarray, others: Sequence[StillImage]) -> "_Usual":
         import cv2
 
         stack = [
-            in_same_light(other.picture, channel_gains(reference, other.picture), levels_per_grey=_LEVELS_PER_GREY)
+            in_same_light(other.image, channel_gains(reference, other.image), levels_per_grey=_LEVELS_PER_GREY)
             for other in others
         ]
         median = stack_median(stack)
@@ -321,18 +321,18 @@ class _Usual:
             scatter.astype(np.float32) * np.float32(1.48 / _LEVELS_PER_GREY) + np.float32(_FLOOR_GREY),
         )
 
-    def changes_of(self, stills: Sequence[StillPicture]) -> np.ndarray:
+    def changes_of(self, stills: Sequence[StillImage]) -> np.ndarray:
         """Return how far each pixel of stills lies from what is usual: (k, h, w) uint8, in levels of `_LEVELS_PER_SIGMA`."""
-        changes = [np.minimum(self._change_of(still.picture), np.float32(_MOST_SIGMAS)) for still in stills]
+        changes = [np.minimum(self._change_of(still.image), np.float32(_MOST_SIGMAS)) for still in stills]
         levels = [np.round(one * np.float32(_LEVELS_PER_SIGMA)).astype(np.uint8) for one in changes]
         return np.array(levels, dtype=np.uint8).reshape(len(stills), *self.median.shape[:2])
 
-    def _change_of(self, picture: np.ndarray) -> np.ndarray:
+    def _change_of(self, image: np.ndarray) -> np.ndarray:
         """Return how far each pixel lies from what is usual: (h, w) float32, in standard deviations."""
         median = self.median
-        if picture is not self.reference:
-            median = median * channel_gains(picture, self.reference).astype(np.float32)
-        shown = picture.astype(np.float32)
+        if image is not self.reference:
+            median = median * channel_gains(image, self.reference).astype(np.float32)
+        shown = image.astype(np.float32)
         off = (shown - local_light(shown, median) * median) / self.scatter
         return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", off, off)))
 
@@ -369,12 +369,12 @@ def _of_a_larger_thing(change: np.ndarray, inner: np.ndarray, side: int) -> np.n
     return np.asarray(cv2.max(cv2.max(*lines), cv2.max(*bodies)))
 
 
-def _moved(picture: np.ndarray, right: int, down: int) -> np.ndarray:
-    """Return what a picture shows so far to the right of, and below, each pixel; 0 beyond its edges."""
+def _moved(image: np.ndarray, right: int, down: int) -> np.ndarray:
+    """Return what an image shows so far to the right of, and below, each pixel; 0 beyond its edges."""
     import cv2
 
     move = np.array([[1.0, 0.0, -right], [0.0, 1.0, -down]])
-    return np.asarray(cv2.warpAffine(picture, move, picture.shape[1::-1], flags=cv2.INTER_NEAREST))
+    return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_NEAREST))
 
 
 _REACH, _LEAST_REACH_PX = 0.1, 4.0
@@ -382,7 +382,7 @@ _REACH, _LEAST_REACH_PX = 0.1, 4.0
 _HALF, _LEAST_HALF_PX = 0.75, 8
 """Half the side of the patch around a click that is compared between frames, in widths of the reflector, and at least."""
 _SHAKE_PX = 3.0
-"""How far the picture may move between two frames of a dwell; farther off it is another one."""
+"""How far the image may move between two frames of a dwell; farther off it is another one."""
 _LEAST_ALIKE = 0.6
 """Correlation from which on two frames show the same around a click: nobody stands before it, and nothing was moved."""
 _LEAST_SHARE = 0.5
@@ -449,15 +449,15 @@ def _alike(
         if number == clicked:
             continue
         try:
-            picture = frames.image(number)
+            image = frames.image(number)
         except CalibrationError:
             continue
-        around = cv2.getRectSubPix(picture, (2 * wider + 1, 2 * wider + 1), centre)
+        around = cv2.getRectSubPix(image, (2 * wider + 1, 2 * wider + 1), centre)
         scores = cv2.matchTemplate(around, patch, cv2.TM_CCOEFF_NORMED)
         row, column = (int(v) for v in np.unravel_index(int(np.argmax(scores)), scores.shape))
         shift = np.array([column, row], dtype=np.float64) - (wider - half)
         if scores[row, column] >= _LEAST_ALIKE and float(np.hypot(*shift)) <= _SHAKE_PX:
-            yield picture, shift
+            yield image, shift
 
 
 def _mean(apexes: list[Apex]) -> DwellAverage:

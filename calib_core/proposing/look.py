@@ -1,4 +1,4 @@
-"""The look of the reflector that a person confirmed, found again in the pictures of other dwells."""
+"""The look of the reflector that a person confirmed, found again in the images of other dwells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,10 +8,10 @@ import numpy as np
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.camera import Camera
 from calib_core.proposing.apex import Apex, find_apex
-from calib_core.proposing.apex_refinement import full_picture
+from calib_core.proposing.apex_refinement import full_image
 from calib_core.proposing.dwell_views import DwellView, width_seen_px, with_blobs
-from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
-from calib_core.proposing.still_pictures import FrameSource
+from calib_core.proposing.image_candidates import ImageCandidate, Surroundings
+from calib_core.proposing.still_images import FrameSource
 
 _HALF = 0.75
 """Half the side of the patch, in widths of the reflector."""
@@ -44,7 +44,7 @@ class Look:
     """What the reflector looks like around the pixel that a person confirmed.
 
     Attributes:
-        patch: (n, n, 3) uint8 of the full picture; its middle pixel is nearest to the confirmed one.
+        patch: (n, n, 3) uint8 of the full image; its middle pixel is nearest to the confirmed one.
         offset_px: (2,) from that middle to the confirmed pixel.
         width_px: of the reflector there.
         sigma_px: of the confirmed pixel per axis.
@@ -73,18 +73,18 @@ def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | N
     """
     import cv2
 
-    picture = full_picture(view.clear, frames)
-    if picture is None:
+    image = full_image(view.clear, frames)
+    if image is None:
         return None
     pixel_px = np.asarray(pixel_px, dtype=np.float64)
     width_px = width_seen_px(view, pixel_px)
     reach_px = max(_LEAST_SNAP_PX, _SNAP * width_px)
-    apex = find_apex(picture, pixel_px, reach_px=reach_px, size_px=width_px)
+    apex = find_apex(image, pixel_px, reach_px=reach_px, size_px=width_px)
     at_apex = isinstance(apex, Apex)
     at_px, sigma_px = (apex.pixel_px, apex.sigma_px) if isinstance(apex, Apex) else (pixel_px, _CLICK_SIGMA_PX)
     middle = np.round(at_px)
     side = 2 * max(4, int(np.ceil(_HALF * width_px)) + 2) + 1
-    patch = cv2.getRectSubPix(picture, (side, side), (float(middle[0]), float(middle[1])))
+    patch = cv2.getRectSubPix(image, (side, side), (float(middle[0]), float(middle[1])))
     return Look(patch, at_px - middle, width_px, sigma_px, at_apex, width_px / view.width_px)
 
 
@@ -97,7 +97,7 @@ def with_look(
         views: of all dwells.
         looks: of the confirmed reflectors; without any the views stay as they are.
         frames: of the camera.
-        camera: its intrinsics; candidates outside its picture are left out.
+        camera: its intrinsics; candidates outside its image are left out.
     """
     if not looks:
         return tuple(views)
@@ -109,7 +109,7 @@ def likeness_elsewhere(look: Look, views: Sequence[DwellView], frames: FrameSour
 
     Args:
         look: of a click.
-        views: of other dwells; those without pictures show nothing.
+        views: of other dwells; those without images show nothing.
         frames: of the camera.
         camera: its intrinsics.
     """
@@ -127,7 +127,7 @@ def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, came
     near = sorted(looks, key=lambda look: _unlike_in_size(look, view.width_px))[:_LOOKS]
     rough = [(_best_match(one, near, view.width_px, _ROUGH_WIDTH_PX, 1.0), one) for one in seen]
     rough.sort(key=lambda pair: -pair[0].likeness)
-    found: list[PictureCandidate] = []
+    found: list[ImageCandidate] = []
     size_px = np.array([camera.width_px, camera.height_px])
     for place, (match, candidate) in enumerate(rough):
         moved = replace(candidate, likeness=match.likeness)
@@ -142,14 +142,14 @@ def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, came
     return replace(view, candidates=tuple(found))
 
 
-def _with_surroundings(view: DwellView, frames: FrameSource) -> list[PictureCandidate]:
-    """Return the candidates of which the picture is known; frames are decoded only where it was not kept."""
+def _with_surroundings(view: DwellView, frames: FrameSource) -> list[ImageCandidate]:
+    """Return the candidates of which the image is known; frames are decoded only where it was not kept."""
     if all(one.surroundings is not None for one in view.candidates):
         return list(view.candidates)
-    picture = full_picture(view.clear if len(view.clear) else view.frames, frames)
-    if picture is None:
+    image = full_image(view.clear if len(view.clear) else view.frames, frames)
+    if image is None:
         return []
-    whole = Surroundings(picture, np.zeros(2))
+    whole = Surroundings(image, np.zeros(2))
     return [one if one.surroundings is not None else replace(one, surroundings=whole) for one in view.candidates]
 
 
@@ -169,13 +169,13 @@ class _Match:
 
 
 def _best_match(
-    candidate: PictureCandidate, looks: Sequence[Look], width_px: float, at_width_px: float, finer: float
+    candidate: ImageCandidate, looks: Sequence[Look], width_px: float, at_width_px: float, finer: float
 ) -> _Match:
     fine = min(finer, at_width_px / width_px)
     return max((_match(candidate, look, width_px, fine) for look in looks), key=lambda match: match.likeness)
 
 
-def _match(candidate: PictureCandidate, look: Look, width_px: float, fine: float) -> _Match:
+def _match(candidate: ImageCandidate, look: Look, width_px: float, fine: float) -> _Match:
     """Correlate a look with the surroundings of a candidate, at the scale of its range and `fine` times finer."""
     import cv2
 
@@ -190,7 +190,7 @@ def _match(candidate: PictureCandidate, look: Look, width_px: float, fine: float
     return _Match(corner_px + peak / fine, float(np.clip(scores[row, column], -1.0, 1.0)), look)
 
 
-def _moved(candidate: PictureCandidate, match: _Match, width_px: float) -> PictureCandidate:
+def _moved(candidate: ImageCandidate, match: _Match, width_px: float) -> ImageCandidate:
     """Move a candidate to where the look is found, and on to an apex there that may be what was clicked."""
     look, likeness = match.look, match.likeness
     carried_px = look.sigma_px * width_px / look.width_px
@@ -202,7 +202,7 @@ def _moved(candidate: PictureCandidate, match: _Match, width_px: float) -> Pictu
         assert candidate.surroundings is not None, "given by _with_surroundings"
         corner_px = candidate.surroundings.corner_px
         near_px = match.pixel_px - corner_px
-        apex = find_apex(candidate.surroundings.picture, near_px, reach_px=reach_px, size_px=width_px)
+        apex = find_apex(candidate.surroundings.image, near_px, reach_px=reach_px, size_px=width_px)
         if isinstance(apex, Apex):
             at_px = corner_px + apex.pixel_px
             return replace(candidate, pixel_px=at_px, sigma_px=apex.sigma_px, likeness=likeness, has_apex=True)
@@ -230,12 +230,12 @@ def _template(look: Look, width_px: float) -> tuple[np.ndarray, np.ndarray]:
 def _resampled(
     surroundings: Surroundings, centre_px: Vector2, half_px: float, fine: float
 ) -> tuple[np.ndarray, Vector2]:
-    """Return the surroundings of a pixel on a grid `fine` times finer, and where that grid begins in the full picture."""
+    """Return the surroundings of a pixel on a grid `fine` times finer, and where that grid begins in the full image."""
     import cv2
 
     half = int(np.ceil(half_px * fine))
     corner_px = np.asarray(centre_px) - half / fine
-    part: np.ndarray = surroundings.picture.astype(np.float32)
+    part: np.ndarray = surroundings.image.astype(np.float32)
     if fine < 1.0:
         part = cv2.GaussianBlur(part, (0, 0), 0.35 * np.sqrt(1.0 / fine**2 - 1.0))
     begin_px = corner_px - surroundings.corner_px

@@ -12,8 +12,8 @@ prior. Tolerances shrink from step to step, and the noise level that explains a 
 
 How far chance goes is measured on the recording itself: the radar's positions are dealt to other dwells, neighbours
 in time too, as whoever carries a reflector down an aisle would be taken for right by the order alone. And a person
-who goes from place to place is seen by the radar and in the pictures alike; but where a reflector is large enough in
-the picture its three sheets meet in a point, and a person's clothes rarely do.
+who goes from place to place is seen by the radar and in the images alike; but where a reflector is large enough in
+the image its three sheets meet in a point, and a person's clothes rarely do.
 """
 
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ class Expectation:
     Attributes:
         off_rad: (m, n, k, 2) prediction minus candidate, across its ray.
         jacobian: (m, n, k, 2, 8) of it by rotation, camera position and scales.
-        covariance: (m, n, k, 2, 2) of it by the noise of radar and picture.
+        covariance: (m, n, k, 2, 2) of it by the noise of radar and image.
         probability: (m, n, k) that the candidate is the reflector, given the pose.
         weight: (m, n, k) of its offset in a fit: the probability, less for what lies aside.
         log_odds: (m, n) of each dwell over chance.
@@ -612,7 +612,7 @@ _OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
 """Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
 
 _BEFORE = 1.0
-"""Log-odds before any picture: most recordings contain a reflector."""
+"""Log-odds before any image: most recordings contain a reflector."""
 
 _LEAST_SEEN = 3
 """Fewer places of that width say nothing."""

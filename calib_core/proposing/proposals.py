@@ -13,7 +13,7 @@ from calib_core.interchange.own.documents import ClickDocument, finite_or_none
 from calib_core.interchange.own.proposal_documents import (
     PROPOSALS_SCHEMA,
     DwellDocument,
-    PictureCandidateDocument,
+    ImageCandidateDocument,
     ProposalDocument,
     ProposalsDocument,
     RoughMountingDocument,
@@ -22,17 +22,17 @@ from calib_core.interchange.own.proposal_documents import (
 from calib_core.interchange.syntax.strict_json import builtins_of, json_text
 from calib_core.measurements import TimeNs
 from calib_core.proposing.dwell_views import DwellView
-from calib_core.proposing.picture_candidates import PictureCandidate
+from calib_core.proposing.image_candidates import ImageCandidate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """Where the reflector probably stands in the pictures of one placement.
+    """Where the reflector probably stands in the images of one placement.
 
     Attributes:
         placement: the radar's.
         image_time: stamp of the frame in which it is shown.
-        pixel_px: (2,) what the picture shows, never what the radar predicts.
+        pixel_px: (2,) what the image shows, never what the radar predicts.
         sigma_px: standard deviation of that pixel per axis, if it is the reflector.
         confidence: probability that it is the reflector, 0 to 1.
         candidates: all places in question, `pixel_px` first.
@@ -44,7 +44,7 @@ class Proposal:
     pixel_px: Vector2
     sigma_px: float
     confidence: float
-    candidates: tuple[PictureCandidate, ...]
+    candidates: tuple[ImageCandidate, ...]
     reason: str = ""
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class ProposalSource:
 
     Attributes:
         recording: names of its files.
-        image_topic: of the pictures.
+        image_topic: of the images.
         radar_topics: of the radar.
         reflector_m: the width that was looked for.
         confirmed: ids of the clicks that a person confirmed before.
@@ -163,8 +163,8 @@ def _dwell(placement: Placement) -> DwellDocument:
     )
 
 
-def _candidate(candidate: PictureCandidate) -> PictureCandidateDocument:
-    return PictureCandidateDocument(
+def _candidate(candidate: ImageCandidate) -> ImageCandidateDocument:
+    return ImageCandidateDocument(
         _pixel(candidate.pixel_px), candidate.sigma_px, candidate.strength, finite_or_none(candidate.likeness)
     )
 

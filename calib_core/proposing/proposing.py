@@ -27,7 +27,7 @@ LEAST_CONFIDENCE = 0.5
 _WEAK, _UNSURE = 0.8, 0.9
 """A proposal of less confidence comes with a reason, and with one if its apex is not seen."""
 _CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
-"""Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the pictures
+"""Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the images
 of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
 _CHANCE_AFTER_CLICK = 5.0
 """The same once a click says where one dwell lies: fewer poses are left that could agree by chance."""
@@ -44,8 +44,8 @@ _SAME_PLACE = 3.0
 _VAGUE_PX = 3.0
 _VAGUE = "its apex is not seen clearly"
 _NO_FRAME = "the camera recorded no frame while it stood there"
-_NO_CHANGE = "nothing of the reflector's size changed in the picture"
-_NO_POSE = "picture and radar agree on no pose yet: click the first two places yourself"
+_NO_CHANGE = "nothing of the reflector's size changed in the image"
+_NO_POSE = "image and radar agree on no pose yet: click the first two places yourself"
 _OPEN = "the clicks leave open where it is; a further one says more"
 _NO_APEX = "what stood there shows no reflector's apex; if it is one, click the first two places yourself"
 _ELSEWHERE = "no place that changed lies where the other placements say"
@@ -63,7 +63,7 @@ def proposals_of(
     *,
     confirmed: Sequence[ReflectorClick] = (),
 ) -> Proposals:
-    """Rank what the pictures show for each dwell; what is probably wrong is not proposed.
+    """Rank what the images show for each dwell; what is probably wrong is not proposed.
 
     Args:
         views: of all placements.

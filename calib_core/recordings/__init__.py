@@ -5,10 +5,10 @@ from calib_core.recordings.containers.opening import holds_recording
 from calib_core.recordings.containers.sources import about_assumptions, assumption_hint
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
-from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
+from calib_core.recordings.plain_files.folder_cameras import size_of_images_beside
 from calib_core.recordings.recording import (
     Recording,
-    first_picture,
+    first_image,
     inspect_recording,
     open_recording,
     require_files,
@@ -39,14 +39,14 @@ __all__ = [
     "clock_lines",
     "describe",
     "figures_text",
-    "first_picture",
+    "first_image",
     "frame_transforms",
     "holds_recording",
     "inspect_recording",
     "open_recording",
     "recording_summary",
     "require_files",
-    "size_of_pictures_beside",
+    "size_of_images_beside",
     "verification_text",
     "verify_recording",
     "video_format",

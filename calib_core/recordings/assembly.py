@@ -161,7 +161,7 @@ def assemble(
 
 
 def _camera_beside(sources: Sequence[Source], selection: Selection) -> FolderCamera | None:
-    """Return the intrinsics that a data set publishes for the pictures in use; a camera-info topic takes precedence."""
+    """Return the intrinsics that a data set publishes for the images in use; a camera-info topic takes precedence."""
     image = selection.image
     if image is None or selection.camera_info is not None:
         return None

@@ -38,7 +38,7 @@ class BoxLayout:
     Attributes:
         name: what kind of message it is, for people.
         boxes: the list of boxes.
-        stamp: path of the picture's stamp in the message; "" if every element has its own (Foxglove).
+        stamp: path of the image's stamp in the message; "" if every element has its own (Foxglove).
         edges: paths of left, top, right and bottom; empty if the centre is given.
         centre: paths of the centre's u and v, the width and the height; empty if the edges are given.
         angle: path of the rectangle's turn [rad]; "" without one.
@@ -276,7 +276,7 @@ def _at(element: Any, path: str) -> Any:
 
 
 def drawn_boxes(message: Message) -> Iterator[tuple[TimeNs, Box]]:
-    """Yield each upright rectangle of a message with the stamp of its picture.
+    """Yield each upright rectangle of a message with the stamp of its image.
 
     Raises:
         MessageError: the message has another layout.

@@ -18,7 +18,7 @@ from calib_core.measurements import Boxes, DataWarning, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.box_topics import boxes_in_topic
 from calib_core.recordings.camera.image_stream import ImageStream
-from calib_core.recordings.camera.images import EncodedImage, is_picture
+from calib_core.recordings.camera.images import EncodedImage, is_image
 from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.containers.opening import open_beginnings, open_sources
 from calib_core.recordings.containers.sources import Assumption, Channel, Source, StatedAssumption
@@ -295,7 +295,7 @@ class Recording:
         """
         self._check(index)
         assert self._assembly.images is not None
-        return self._assembly.images.picture(index)
+        return self._assembly.images.image(index)
 
     def recorded_format(self, index: int) -> str:
         """Return the format a frame was recorded in: "jpeg", "png", "raw bgr8", "h264 video" or "video file".
@@ -423,7 +423,7 @@ def open_recording(
     chunks; compressed chunks that contain such messages are read once in full.
 
     Args:
-        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of pictures or of radar .pcd, .bin, CSV
+        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of images or of radar .pcd, .bin, CSV
             and JSON files; radar CSV and JSON lines; videos; folders of data sets.
         options: topics and clock.
         require: what it must contain; to read intrinsics, "image" is enough.
@@ -509,8 +509,8 @@ def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
     return tuple(paths)
 
 
-def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:
-    """Return a picture from the beginning of a recording, reading very little of it.
+def first_image(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:
+    """Return an image from the beginning of a recording, reading very little of it.
 
     It comes from the camera that opening the recording will most likely choose, and is not always the first frame of the
     timeline.
@@ -524,26 +524,26 @@ def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None
     """
     options = options or RecordingOptions()
     try:
-        for source in open_beginnings(paths, _is_picture):
+        for source in open_beginnings(paths, _is_image):
             try:
-                picture = _picture(source, options)
+                image = _image(source, options)
             finally:
                 source.close()
-            if picture is not None:
-                return picture
+            if image is not None:
+                return image
     except (RecordingError, OSError):
         return None  # opening the recording reports what is wrong
     return None
 
 
-def _is_picture(channel: Channel) -> bool:
+def _is_image(channel: Channel) -> bool:
     try:
-        return is_picture(definition_of(channel))
+        return is_image(definition_of(channel))
     except RecordingError:
         return False
 
 
-def _picture(source: Source, options: RecordingOptions) -> EncodedImage | None:
+def _image(source: Source, options: RecordingOptions) -> EncodedImage | None:
     topics, _ = join_topics((source,))
     inventory = Inventory(source.path.name, topics, {topic.name: _usage(topic) for topic in topics}, _counts(source))
     topic = select_image(inventory, options.image_topic if options.image_topic in inventory.usages else None)
@@ -557,7 +557,7 @@ def _picture(source: Source, options: RecordingOptions) -> EncodedImage | None:
 def _usage(topic: Topic) -> Usage:
     """Inspect the messages of image topics; of other topics, only the declaration."""
     channel = topic.parts[0][1]
-    if _is_picture(channel):
+    if _is_image(channel):
         return usage_of(topic)
     try:
         return Usage("camera-info" if is_camera_info(definition_of(channel)) else "other")

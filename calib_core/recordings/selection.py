@@ -11,7 +11,7 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.options import option
 from calib_core.recordings.box_topics import BoxLayout, box_layout
-from calib_core.recordings.camera.images import ImageLayout, is_picture
+from calib_core.recordings.camera.images import ImageLayout, is_image
 from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_plan import StatedReading
@@ -38,7 +38,7 @@ _RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii
 _OBJECT_WORDS = ("object", "track")
 _MOST_RADARS = 12  # that are compared
 _ADDED_BY_EXPORT = "/cocalib/"
-_NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
+_NOT_IMAGES = ("depth", "disparity", "mask", "infra", "debug")
 _PLENTY = 0.25  # of the most static returns ahead: with fewer, a radar looks elsewhere
 _COMPARABLE = 0.5  # with more than this of them, another radar could be meant
 _NOTHING_STATIC = 1.0  # returns a scan: the recording was made on the move
@@ -96,21 +96,19 @@ def usage_of(topic: Topic, stated: StatedReading = _NOTHING) -> Usage:
     boxes = box_layout(definition)
     if boxes is not None:
         return Usage("other", boxes=boxes)
-    pictures = is_picture(definition)
-    usage = Usage("image" if pictures else "other", problem="no messages")
+    images = is_image(definition)
+    usage = Usage("image" if images else "other", problem="no messages")
     for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
         try:
             payload = topic.payload(row)
             return (
-                _image_usage(topic, definition, payload)
-                if pictures
-                else _radar_usage(topic, definition, payload, stated)
+                _image_usage(topic, definition, payload) if images else _radar_usage(topic, definition, payload, stated)
             )
         except MessageError as error:
             usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
         except RecordingError as error:
             usage = replace(usage, problem=f"its messages cannot be read: {error}")
-    if usage.problem != "no messages" and "radar" in topic.name.lower() and not pictures:
+    if usage.problem != "no messages" and "radar" in topic.name.lower() and not images:
         return replace(usage, kind="radar")
     return usage
 
@@ -408,12 +406,12 @@ def holds_objects(topic: Topic) -> bool:
 
 
 def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
-    """Rank pictures above depth images, then by camera info, number of messages, and files above raw pixels."""
+    """Rank images above depth images, then by camera info, number of messages, and files above raw pixels."""
     layout = inventory.usages[topic.name].image
     assert layout is not None
-    picture = not any(word in topic.name.lower() for word in _NOT_PICTURES)
+    image = not any(word in topic.name.lower() for word in _NOT_IMAGES)
     front = "front" in topic.name.lower()
-    return picture, _nearest_info(topic, inventory) is not None, front, inventory.count(topic), layout.compressed
+    return image, _nearest_info(topic, inventory) is not None, front, inventory.count(topic), layout.compressed
 
 
 def _nearest_info(image: Topic | None, inventory: Inventory) -> Topic | None:

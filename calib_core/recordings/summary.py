@@ -549,7 +549,7 @@ def _intrinsics(camera: CameraSummary) -> str:
     if camera.matrix_px is None or camera.distortion is None:
         return (
             "no usable intrinsics in the recording: give them with --camera FILE, "
-            "or calibrate the lens from pictures of a board (cocalib intrinsics)"
+            "or calibrate the lens from images of a board (cocalib intrinsics)"
         )
     k = camera.matrix_px
     lens = ", ".join(f"{value:.5g}" for value in camera.distortion)

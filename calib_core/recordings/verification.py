@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
-from calib_core.recordings.camera.images import ImageLayout, is_picture
+from calib_core.recordings.camera.images import ImageLayout, is_image
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, has_end, png_fault
 from calib_core.recordings.containers.chunks import ChunkedSource
 from calib_core.recordings.containers.sources import Channel, Progress, Source
@@ -43,10 +43,10 @@ class TopicCheck:
     Attributes:
         topic: its name.
         type: of its messages.
-        read: number of messages that are whole and fit their definition; of pictures, that can be decoded.
+        read: number of messages that are whole and fit their definition; of images, that can be decoded.
         unread: number of whole messages whose type is unknown or whose encoding is not supported.
         damaged: number of messages that are cut off, overwritten, or in a chunk with a wrong checksum.
-        undecodable: number of messages that are there but do not fit their definition, or are no whole picture.
+        undecodable: number of messages that are there but do not fit their definition, or are no whole image.
         fault: the first reason of all these; "" if there is none.
     """
 
@@ -77,10 +77,10 @@ class Verification(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """How to read: the problems of topics that are not supported, whether to decode pictures, whom to tell."""
+    """How to read: the problems of topics that are not supported, whether to decode images, whom to tell."""
 
     problems: Mapping[str, str]
-    decode_pictures: bool
+    decode_images: bool
     progress: Progress | None
 
 
@@ -95,18 +95,18 @@ class _Topics:
 
 
 def verify_recording(
-    recording: Recording, *, decode_pictures: bool = False, progress: Progress | None = None
+    recording: Recording, *, decode_images: bool = False, progress: Progress | None = None
 ) -> Verification:
     """Read every message of a recording, and check every checksum.
 
     Args:
         recording: open; it need not have a radar or a camera.
-        decode_pictures: decode each picture instead of looking at its first and last bytes.
+        decode_images: decode each image instead of looking at its first and last bytes.
         progress: called with the amount done and the total, of each step.
     """
     topics = _Topics()
     problems = {one.name: one.problem for one in recording.topics if one.problem and one.problem != "no messages"}
-    reading = _Reading(problems, decode_pictures, progress)
+    reading = _Reading(problems, decode_images, progress)
     for source in recording.sources:
         _read_source(source, topics, reading)
     warnings = recording.warnings
@@ -178,7 +178,7 @@ class _Reader:
         self.problem = reading.problems.get(channel.topic, "")
         self.misfit = ""
         self._definition: Definition | None = None
-        self._pictures: PictureCheck | None = None
+        self._images: ImageCheck | None = None
         try:
             self._definition = definition_of(channel)
         except MessageError as error:
@@ -187,51 +187,51 @@ class _Reader:
             else:
                 self.problem = str(error)
             return
-        if is_picture(self._definition) and not self.problem:
-            self._pictures = PictureCheck(ImageLayout(self._definition, channel.topic), reading.decode_pictures)
+        if is_image(self._definition) and not self.problem:
+            self._images = ImageCheck(ImageLayout(self._definition, channel.topic), reading.decode_images)
 
     def read(self, payload: bytes) -> None:
         """Decode one message.
 
         Raises:
-            MessageError: it does not fit its definition, or is no whole picture.
+            MessageError: it does not fit its definition, or is no whole image.
         """
         if self.misfit:
             raise MessageError(self.misfit)
         if self._definition is not None:
             decode(self._definition, payload)
-        if self._pictures is not None:
-            self._pictures.check(payload)
+        if self._images is not None:
+            self._images.check(payload)
 
     def cut_off(self) -> tuple[int, str]:
-        """Return how many pictures are cut off, and why."""
-        return (0, "") if self._pictures is None else self._pictures.cut_off()
+        """Return how many images are cut off, and why."""
+        return (0, "") if self._images is None else self._images.cut_off()
 
 
 @dataclass(slots=True)
-class PictureCheck:
-    """Checks the pictures of one topic, one after the other.
+class ImageCheck:
+    """Checks the images of one topic, one after the other.
 
     Attributes:
         layout: of the topic's messages.
-        decode: whether to decode each picture.
-        open_ended: number of pictures without an end marker, which some drivers never write.
-        pictures: number of pictures checked.
+        decode: whether to decode each image.
+        open_ended: number of images without an end marker, which some drivers never write.
+        images: number of images checked.
     """
 
     layout: ImageLayout
     decode: bool
     open_ended: int = 0
-    pictures: int = 0
+    images: int = 0
     _decoder: "_Complaints" = field(default_factory=lambda: _Complaints())
 
     def check(self, payload: bytes) -> None:
         """Check one message.
 
         Raises:
-            MessageError: it contains no picture, or a damaged one.
+            MessageError: it contains no image, or a damaged one.
         """
-        self.pictures += 1
+        self.images += 1
         if self.layout.packet(payload) is not None:
             return
         self.layout.size_px(payload)
@@ -240,21 +240,21 @@ class PictureCheck:
             self.open_ended += 1
         start = payload.find(PNG_MAGIC) if self.layout.compressed else -1
         if start >= 0 and (fault := png_fault(payload[start:])):
-            raise MessageError(f"topic {self.layout.topic}: a picture {fault}")
+            raise MessageError(f"topic {self.layout.topic}: an image {fault}")
         if self.decode:
             with self._decoder.heard() as said:
-                self.layout.picture(payload)
+                self.layout.image(payload)
             if said:
                 raise MessageError(f"topic {self.layout.topic}: the decoder says: {said[0]}")
 
     def cut_off(self) -> tuple[int, str]:
-        """Return how many pictures are cut off, and why; none if the driver writes no end markers at all."""
-        habit = self.open_ended > self.pictures / 2
+        """Return how many images are cut off, and why; none if the driver writes no end markers at all."""
+        habit = self.open_ended > self.images / 2
         return (0, "") if habit or not self.open_ended else (self.open_ended, _CUT)
 
 
 class _Complaints:
-    """What the picture decoder prints to the standard error of the process: its only sign of damage it passes over."""
+    """What the image decoder prints to the standard error of the process: its only sign of damage it passes over."""
 
     @contextmanager
     def heard(self) -> Iterator[list[str]]:

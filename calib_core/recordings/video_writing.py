@@ -19,7 +19,7 @@ _JPEG_QUALITY = 95
 
 @dataclass(slots=True)
 class SkippedFrames:
-    """The frames that are left out while a recording's pictures are written.
+    """The frames that are left out while a recording's images are written.
 
     Attributes:
         other_size: number of frames whose size differs from the first.
@@ -78,7 +78,7 @@ def video_format(path: Path) -> str:
 def write_video(
     recording: Recording, path: Path, *, progress: Callable[[int, int], None] | None = None
 ) -> WrittenVideo:
-    """Write the camera's frames to a video file; JPEG is not decoded, other pictures are encoded once.
+    """Write the camera's frames to a video file; JPEG is not decoded, other images are encoded once.
 
     Args:
         recording: with a camera.

@@ -186,7 +186,7 @@ class NextPlacement:
 
     Attributes:
         position_radar_m: (3,) in the radar frame.
-        pixel_px: (2,) where it appears in the picture.
+        pixel_px: (2,) where it appears in the image.
         gain: present over expected uncertainty (standard deviations), at least 1.
         may_stop: no further placement would reduce the uncertainty noticeably.
     """
@@ -259,7 +259,7 @@ class Calibration:
     def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
         """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
 
-        It covers the uncertainty of the pose only, for a radar without elevation that of the map from its plane to the picture;
+        It covers the uncertainty of the pose only, for a radar without elevation that of the map from its plane to the image;
         the noise of a measured radar position is not included.
 
         Args:

@@ -62,7 +62,7 @@ def without_mounting(
 ) -> Matrix66:
     """Return the covariance (6, 6) that remains if the mounting of a radar without elevation is left out.
 
-    It is that of the map from reported positions to the picture: in the plane of the placements the pairs determine it.
+    It is that of the map from reported positions to the image: in the plane of the placements the pairs determine it.
     """
     moves = mounting_moves(camera_from_radar, height_m, radar)
     values, vectors = np.linalg.eigh(covariance - moves @ moves.T)

@@ -118,7 +118,7 @@ def reflector_offset(axis: int, name: str, sigma_m: float) -> SystematicError:
 
 
 def click_offset(row: int, name: str, sigma_px: float) -> SystematicError:
-    """Return a shift of all clicks along a column (0) or row (1) axis of the picture."""
+    """Return a shift of all clicks along a column (0) or row (1) axis of the image."""
 
     def column(at: Sensitivity) -> np.ndarray:
         shift = np.zeros_like(at.offset_px)
@@ -153,12 +153,12 @@ def radial_distortion(sigma: float) -> SystematicError:
 
 
 _PRIOR_WIDTH_PX = 1920.0
-"""Width of the picture that the priors of the principal point are stated for."""
+"""Width of the image that the priors of the principal point are stated for."""
 
 _NO_AXIS = 1e-10  # variance along an axis, of the largest, up to which the covariance has no such axis
 _LEAST_FOCAL_SHARE = 0.1  # of the given focal length, whatever the pairs say
 _UNKNOWN_FOCAL_SHARE = 0.5  # of the focal length: a covariance that allows more is of something else
-_UNKNOWN_CENTRE_SHARE = 0.5  # of the picture's width or height: the same of the principal point
+_UNKNOWN_CENTRE_SHARE = 0.5  # of the image's width or height: the same of the principal point
 _FOCAL = 2  # the first parameters of a camera are its focal lengths
 
 

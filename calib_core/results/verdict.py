@@ -28,7 +28,7 @@ from calib_core.results.actions import (
 from calib_core.results.calibration import Calibration
 from calib_core.results.systematic_errors import scaled_px
 
-_BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
+_BEYOND = 0.05 / 3.0  # rotation, position and image hold together, so each may fail in a third of the 5 %
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class StatedError:
     Attributes:
         rotation_deg: angle between the stated and the true rotation; of a radar without elevation, about its up axis.
         position_cm: distance between the camera centres; NaN for a radar without elevation, whose mounting decides it.
-        picture_px: distance in the picture between where a radar position in the middle of the placements reprojects and where
+        image_px: distance in the image between where a radar position in the middle of the placements reprojects and where
             it is; NaN if unknown.
         range_m: of that position: the median of the placements.
         in_plane: whether the radar measures no elevation.
@@ -46,7 +46,7 @@ class StatedError:
 
     rotation_deg: float
     position_cm: float
-    picture_px: float
+    image_px: float
     range_m: float
     in_plane: bool
 
@@ -67,13 +67,13 @@ def stated_error(calibration: Calibration) -> StatedError:
         of_axes = about_axes @ calibration.covariance @ about_axes.T
     position_m = _radius(of_centre, freedom)
     common_px = calibration.options.reflector.click_offset_sigma_px  # the pose follows what all clicks are off by
-    picture_px2 = (np.float64(calibration.metrics.picture_sigma_px) ** 2 + common_px**2) * np.eye(2)
+    image_px2 = (np.float64(calibration.metrics.picture_sigma_px) ** 2 + common_px**2) * np.eye(2)
     ranges_m = [float(np.linalg.norm(pair.point_radar_m)) for pair in calibration.pairs if pair.inlier]
-    known = bool(ranges_m) and bool(np.isfinite(picture_px2).all())
+    known = bool(ranges_m) and bool(np.isfinite(image_px2).all())
     return StatedError(
         rotation_deg=_rounded_up(np.rad2deg(_radius(of_axes, freedom))),
         position_cm=float("nan") if in_plane else _rounded_up(100.0 * position_m),
-        picture_px=_rounded_up(_radius(picture_px2, freedom)) if known else float("nan"),
+        image_px=_rounded_up(_radius(image_px2, freedom)) if known else float("nan"),
         range_m=float(np.median(ranges_m)) if known else float("nan"),
         in_plane=in_plane,
     )
@@ -121,7 +121,7 @@ VerdictLevel: TypeAlias = Literal["good", "usable", "coarse", "contradictory", "
 GOOD_DEG, GOOD_CM = 1.0, 10.0
 """A stated error up to these is good."""
 USABLE_DEG, USABLE_CM = 3.0, 30.0
-"""A stated error up to these is usable; a larger one is coarse. Of a radar without elevation only its yaw is judged: its picture
+"""A stated error up to these is usable; a larger one is coarse. Of a radar without elevation only its yaw is judged: its image
 does not depend on how it is mounted, its position does."""
 SURE_PAIRS = 8
 """With fewer pairs neither a wrong pair nor a wrong noise level can be detected: the verdict is coarse, and counts up to them."""

@@ -1,4 +1,4 @@
-"""The true boxes of a simulated recording, and the true origin of its returns; computed from the scene, not from pictures."""
+"""The true boxes of a simulated recording, and the true origin of its returns; computed from the scene, not from images."""
 
 import numpy as np
 
@@ -32,8 +32,8 @@ def is_annotated(recording: SimulatedRecording) -> bool:
 def true_boxes(recording: SimulatedRecording) -> Boxes:
     """Compute the box of everything that moves, in each frame.
 
-    A box goes around the whole silhouette, as seen through the true lens, and ends at the picture's border. Its score is the
-    share of the object that nothing hides and that is in the picture; objects below a quarter have no box.
+    A box goes around the whole silhouette, as seen through the true lens, and ends at the image's border. Its score is the
+    share of the object that nothing hides and that is in the image; objects below a quarter have no box.
     """
     stage = recording.stage
     solids = [block(item) for item in stage.scene.solids]
@@ -61,7 +61,7 @@ def _actors(stage: Stage, time_s: float) -> tuple[Actor, ...]:
 
 
 def _box(stage: Stage, actor: Actor, actors: tuple[Actor, ...], solids: list[Solid]) -> Box | None:
-    """Return an object's box; None if it is not in the picture or mostly hidden."""
+    """Return an object's box; None if it is not in the image or mostly hidden."""
     camera, eye_m = stage.rig.camera, stage.rig.camera_position_world_m
     outline_m = _silhouette(actor.state, eye_m)
     in_camera = stage.rig.camera_from_world @ outline_m

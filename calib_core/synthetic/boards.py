@@ -1,4 +1,4 @@
-"""A calibration board in the picture: as it really is, moving, and at the poses of one that a person waves before a camera.
+"""A calibration board in the image: as it really is, moving, and at the poses of one that a person waves before a camera.
 
 A printed board may be bent, and a moving one is exposed row by row. Every pixel goes through the lens to the board, smooth at
 its edges.
@@ -118,7 +118,7 @@ class BoardMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingBoard:
-    """A board that moves steadily through a picture.
+    """A board that moves steadily through an image.
 
     Attributes:
         printed: the board.
@@ -211,7 +211,7 @@ def _exposures(moving: MovingBoard) -> Values:
 
 
 def _window(moving: MovingBoard) -> Window | None:
-    """Return the part of the picture in which the board is; None if it is not in it."""
+    """Return the part of the image in which the board is; None if it is not in it."""
     pattern, camera = moving.printed.pattern, moving.camera
     x, y = np.meshgrid(*(np.linspace(lines_m[0], lines_m[-1], 24) for lines_m in (pattern.x_m, pattern.y_m)))
     points = np.stack([x, y, moving.printed.height_m(x, y)], axis=-1).reshape(-1, 3)
@@ -343,17 +343,17 @@ _TRIES = 300
 _SHIFTS = 12
 _RIM_PX = 4.0
 _RIM_SQUARES = 1.2
-"""Besides the corners, the squares around them are in the picture, and some of the margin."""
+"""Besides the corners, the squares around them are in the image, and some of the margin."""
 
 
 _TILT_RAD, _ROLL_RAD = np.deg2rad([45.0, 25.0])
-"""Largest tilt out of the picture's plane, and turn within it."""
+"""Largest tilt out of the image's plane, and turn within it."""
 _SIZE = (0.28, 0.65)
-"""Smallest and largest width of the board, as shares of the picture's width."""
+"""Smallest and largest width of the board, as shares of the image's width."""
 
 
 def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: int) -> tuple[RigidTransform, ...]:
-    """Draw poses at which all squares are in the picture: tilted to all sides, near and far, all over it.
+    """Draw poses at which all squares are in the image: tilted to all sides, near and far, all over it.
 
     Args:
         rng: the only source of randomness.
@@ -362,7 +362,7 @@ def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: i
         count: number of poses.
 
     Raises:
-        OptionError: the board does not fit in the picture in this way.
+        OptionError: the board does not fit in the image in this way.
     """
     corners = board.corners_m
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
@@ -375,7 +375,7 @@ def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: i
         pose = next((pose for pose in drawn if pose is not None), None)
         if pose is None:
             raise OptionError(
-                f"only {len(found)} of {count} poses of the waved board fit in the picture; ask for a usual size of pictures"
+                f"only {len(found)} of {count} poses of the waved board fit in the image; ask for a usual size of images"
             )
         found.append(pose)
     return tuple(found)

@@ -57,7 +57,7 @@ def write_recording(
         recording: what to write.
         folder: created if it does not exist; existing files are not overwritten.
         containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each: a folder with
-            metadata.yaml, whose data file can also be opened alone. "csv" writes a folder without ROS: pictures named by date,
+            metadata.yaml, whose data file can also be opened alone. "csv" writes a folder without ROS: images named by date,
             the radar as a table, and camera.yaml.
         progress: called after each frame with the number written and the total over all containers.
 
@@ -67,7 +67,7 @@ def write_recording(
     """
     camera, other = recording.camera, recording.other_camera
     if other is not None and "csv" in containers:
-        raise InputError("a folder of pictures holds one camera; write a recording of two cameras as ros1, mcap or db3")
+        raise InputError("a folder of images holds one camera; write a recording of two cameras as ros1, mcap or db3")
     written_lens(camera.lens, camera.distortion, "camera_info")  # refused before anything is written
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
@@ -78,9 +78,9 @@ def write_recording(
             written.extend(write_plain_files(recording, folder / "recording_csv", frames))
         elif container == "ros1":
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
-            written.append(write_ros1_bag(folder / "camera.bag", _pictures(recording, frames)))
+            written.append(write_ros1_bag(folder / "camera.bag", _images(recording, frames)))
         else:
-            messages = _by_arrival(_pictures(recording, frames), radar_messages(recording, 2))
+            messages = _by_arrival(_images(recording, frames), radar_messages(recording, 2))
             storage: Ros2Container = "mcap" if container == "mcap" else "sqlite3"
             written.append(write_ros2(folder / f"recording_{container}", messages, container=storage))
     _write_truth(recording, folder)
@@ -89,8 +89,8 @@ def write_recording(
     return tuple(written)
 
 
-def pictures_size_bytes(recording: SimulatedRecording) -> int:
-    """Return about how large the pictures of one container will be on disk, by the first one."""
+def images_size_bytes(recording: SimulatedRecording) -> int:
+    """Return about how large the images of one container will be on disk, by the first one."""
     first = next(recording.frames(1)).jpeg(recording.options.jpeg_quality)
     cameras = 1 if recording.other_camera is None else 2
     return len(first) * cameras * len(recording.stage.frame_times.header_ns)
@@ -118,19 +118,19 @@ _HEADER = "Timestamp;Track;Range [m];Azimuth (deg);Elevation (deg);Doppler [m/s]
 def write_plain_files(
     recording: SimulatedRecording, folder: Path, frames: Iterable[SimulatedFrame]
 ) -> tuple[Path, ...]:
-    """Write a folder of pictures, the radar's returns and the intrinsics; return their paths.
+    """Write a folder of images, the radar's returns and the intrinsics; return their paths.
 
     Args:
         recording: what to write.
         folder: created. Its table has a row per return, in degrees, with columns that nobody needs.
         frames: of the recording.
     """
-    pictures = folder / "camera"
-    pictures.mkdir(parents=True)
+    images = folder / "camera"
+    images.mkdir(parents=True)
     for frame in frames:
         name = f"img_{_date(frame.time):%Y-%m-%d_%H-%M-%S-%f}.jpg"
-        (pictures / name).write_bytes(frame.jpeg(recording.options.jpeg_quality))
-    written = [pictures]
+        (images / name).write_bytes(frame.jpeg(recording.options.jpeg_quality))
+    written = [images]
     if recording.options.intrinsics.published:
         written.append(folder / "camera.yaml")
         written[1].write_text(camera_info_text(recording.stage.published_camera, "camera"), encoding="utf-8")
@@ -246,7 +246,7 @@ def camera_messages(
         yield RecordedMessage(f"/{name}/image_raw/compressed", frame.receive_time, image)
 
 
-def _pictures(recording: SimulatedRecording, frames: Iterable[SimulatedFrame]) -> Iterator[RecordedMessage]:
+def _images(recording: SimulatedRecording, frames: Iterable[SimulatedFrame]) -> Iterator[RecordedMessage]:
     other = recording.other_camera
     return _by_arrival(
         camera_messages(recording, frames), *([] if other is None else [camera_messages(other, name="camera_2")])

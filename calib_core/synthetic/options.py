@@ -139,7 +139,7 @@ class Traffic:
 
 @dataclass(frozen=True, slots=True)
 class IntrinsicsErrors:
-    """How the published intrinsics differ from those of the pictures."""
+    """How the published intrinsics differ from those of the images."""
 
     published: bool = option(True, "Record the intrinsics; otherwise the recording says nothing about the lens.")
     focal_length_scale: float = option(1.0, "Published focal length over the true one.", low=0.5, high=2.0)
@@ -215,7 +215,7 @@ class SimulationOptions:
     defects: RadarDefects = option(RadarDefects(), "How the radar differs from a perfect one.")
     surroundings: Surroundings = option(Surroundings(), "What stands and walks in the scene besides the reflector.")
     intrinsics: IntrinsicsErrors = option(
-        IntrinsicsErrors(), "How the published intrinsics differ from those of the pictures."
+        IntrinsicsErrors(), "How the published intrinsics differ from those of the images."
     )
     clicking: Clicking = option(Clicking(), "How the example clicks are made.")
     traffic: Traffic = option(Traffic(), "Who moves in front of the sensors to be judged.")

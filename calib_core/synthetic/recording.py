@@ -39,7 +39,7 @@ class SimulatedFrame:
         good, data = cv2.imencode(
             ".jpg", self.pixels, [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
         )
-        assert good, "OpenCV encodes every 8-bit picture"
+        assert good, "OpenCV encodes every 8-bit image"
         return bytes(data)
 
 
@@ -113,7 +113,7 @@ class SimulatedRecording:
         companion = options.surroundings.companion
         return FrameRenderer.of(stage.scene, stage.rig, companion=companion, edge_m=options.reflector_edge_m)
 
-    def picture(self, index: int, rng: np.random.Generator, renderer: FrameRenderer | None = None) -> np.ndarray:
+    def image(self, index: int, rng: np.random.Generator, renderer: FrameRenderer | None = None) -> np.ndarray:
         """Render a frame: (h, w, 3) uint8, blue first.
 
         Args:
@@ -139,7 +139,7 @@ class SimulatedRecording:
         rng, times = child_rng(self.options, 11), self.stage.frame_times
         for i in range(len(times))[:limit]:
             header, receive = int(times.header_ns[i]), int(times.receive_ns[i])
-            yield SimulatedFrame(TimeNs(header), TimeNs(receive), self.picture(i, rng))
+            yield SimulatedFrame(TimeNs(header), TimeNs(receive), self.image(i, rng))
 
 
 def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:

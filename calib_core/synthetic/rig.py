@@ -133,14 +133,14 @@ _FAR_PX = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A rectangle of the picture, given by its row and column slices."""
+    """A rectangle of the image, given by its row and column slices."""
 
     rows: slice
     columns: slice
 
     @classmethod
     def around(cls, pixels_px: Points2, camera: Camera, margin_px: float = 2.0) -> "Window | None":
-        """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
+        """Return the window around pixels (n, 2); None if it is outside the image or they are not in front."""
         if not np.all(np.isfinite(pixels_px)):
             return None
         bounded = np.clip(pixels_px, -_FAR_PX, _FAR_PX)  # next to the plane of the lens, pixels are beyond any integer

@@ -41,7 +41,7 @@ down at 20 places on a rooftop. No real sensor was involved.
 
 The reflector's position is its apex, the inner corner where the three sheets meet. The apex is the phase centre and the
 point to click. `make sample` (`python -m calib_core.synthetic.sample sample_data`) regenerates these files; how a processor
-rounds decides the last bits of a few pictures.
+rounds decides the last bits of a few images.
 """
 
 

@@ -8,7 +8,7 @@ from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.text import sentence
 
 if TYPE_CHECKING:
-    from calib_core.intrinsics import Board, LeftOutPicture, ResidualField, SplitDifference
+    from calib_core.intrinsics import Board, LeftOutImage, ResidualField, SplitDifference
 
 _FILM = "film the board from at least 10 directions, turned by 30 to 45 deg to the left, right, up and down"
 _BENDS = {
@@ -164,9 +164,7 @@ def no_lens(*, views: int, why: str, model: str) -> Remark:
     )
 
 
-def too_few_views(
-    *, views: int, needed: int, left_out: Sequence["LeftOutPicture"] = (), halves: bool = False
-) -> Remark:
+def too_few_views(*, views: int, needed: int, left_out: Sequence["LeftOutImage"] = (), halves: bool = False) -> Remark:
     if halves:
         return remark(
             f"{views} views cannot be calibrated in halves, {needed} can", "film the board from more directions"

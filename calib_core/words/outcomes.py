@@ -105,9 +105,9 @@ def stopped() -> Remark:
     return remark("stopped before the end", "start it again")
 
 
-def unreadable(*, why: str, pictures: int = 0) -> Remark:
-    if pictures:
-        return remark(f"none of {pictures} images can be read: {why}", "check the files")
+def unreadable(*, why: str, images: int = 0) -> Remark:
+    if images:
+        return remark(f"none of {images} images can be read: {why}", "check the files")
     return remark(why, "the clicks are kept; fix the problem, then change any click to try again")
 
 

@@ -86,7 +86,7 @@ def error_text(error: StatedError) -> str:
         if error.in_plane
         else f"{error.rotation_deg:g} deg, {error.position_cm:g} cm"
     )
-    image = f"; {error.picture_px:g} px at {error.range_m:.0f} m" if np.isfinite(error.picture_px) else ""
+    image = f"; {error.image_px:g} px at {error.range_m:.0f} m" if np.isfinite(error.image_px) else ""
     return f"{pose} (95 %){image}{'; height and tilt assumed' if error.in_plane else ''}"
 
 

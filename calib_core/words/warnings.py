@@ -520,7 +520,7 @@ def shared_error_suspected(
     each. Or the radar's azimuths or elevations change with the range: 0.25 % for each. Or camera or radar turned between
     two placements: fewer than 1 %.
 
-    Could also be: returns of something behind the reflector at every placement, a wrong zoom, a cropped picture,
+    Could also be: returns of something behind the reflector at every placement, a wrong zoom, a cropped image,
     reflections from floor or walls, other points clicked at near placements, or a radar that is worse than its prior says.
     A turn: smooth angle errors, where the placements walked across the view.
     """
@@ -626,10 +626,10 @@ def pixels_suspected(
     pixel_px: Sequence[float] = (),
     reach: Sequence[float] = (),
 ) -> Remark:
-    """Given when clicks are outside the picture, or would be inside with column and row exchanged, or all are in its upper
+    """Given when clicks are outside the image, or would be inside with column and row exchanged, or all are in its upper
     left part.
 
-    Could also be: a picture that was cropped.
+    Could also be: an image that was cropped.
     """
     image = f"the {width_px} x {height_px} image"
     if exchanged:

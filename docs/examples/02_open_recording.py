@@ -2,7 +2,7 @@
 
 import cocalib as cc
 
-# Your own files: cc.open_recording(["radar.bag", "camera.bag"]), or one MCAP file, or a folder of pictures and tables.
+# Your own files: cc.open_recording(["radar.bag", "camera.bag"]), or one MCAP file, or a folder of images and tables.
 with cc.sample_recording() as recording:
     print(recording.radar_topic, len(recording.radar_times), "scans")
     print(recording.image_topic, len(recording.image_times), "frames")

@@ -7,7 +7,7 @@ from calib_core.intrinsics import Board, BoardCorners, BoardSearch, calibrate_le
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
 
-# From pictures, `cocalib intrinsics left*.jpg --board 9x6 --square-mm 25 --out camera.yaml` finds the corners first; in Python
+# From images, `cocalib intrinsics left*.jpg --board 9x6 --square-mm 25 --out camera.yaml` finds the corners first; in Python
 # calib_core.intrinsics.search_boards does. Here the corners are simulated, so the true lens is known.
 rng = np.random.default_rng(5)
 board, truth = Board("checkerboard", 9, 6, 0.025), typical_camera("plumb_bob", width_px=1280, height_px=720)

@@ -15,7 +15,7 @@ import { state } from "./state.js";
  */
 
 /** The headings of the help, from the top. */
-const GROUPS = ["Time", "Mark", "Pairs", "Picture", "3D view", "Panel", "File", "Help"];
+const GROUPS = ["Time", "Mark", "Pairs", "Image", "3D view", "Panel", "File", "Help"];
 
 /** In the order of the help. @type {Action[]} */
 export const ACTIONS = [];
@@ -57,8 +57,8 @@ export function act(action) {
 /** Why nothing can be done yet; "" once the recording is open. */
 export const opened = () => (state.recording ? "" : "The recording is not open yet");
 
-/** Why nothing can be done in pictures; "" if it can. */
-export const withPictures = () => opened() || (state.looking ? "There are no pictures in this recording" : "");
+/** Why nothing can be done in images; "" if it can. */
+export const withImages = () => opened() || (state.looking ? "There are no images in this recording" : "");
 
 /** @type {Record<string, string>} */
 const NAMES = { ...(/Mac|iP/.test(navigator.platform) ? { Ctrl: "⌘" } : {}), ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };

@@ -1,4 +1,4 @@
-/** What is drawn over the frame. Whoever draws something adds it here; picture/picture.js draws it. */
+/** What is drawn over the frame. Whoever draws something adds it here; image/image.js draws it. */
 
 import { state } from "./state.js";
 

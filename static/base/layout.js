@@ -5,11 +5,11 @@ import { emit, on } from "./state.js";
 
 const root = document.documentElement;
 const KEPT = "cocalib-layout";
-/** Below this width [CSS px], or this height, there is room for the picture and one pane. */
+/** Below this width [CSS px], or this height, there is room for the image and one pane. */
 const NARROW = 900;
 const LOW = 560;
 /** Dividers are kept as parts of what they divide, so that they suit every window: the panel's of the width, the 3D view's of the
- * column, the picture's of a narrow window's height.
+ * column, the image's of a narrow window's height.
  * @type {{right?: number, space?: number, split?: number, theme?: string, tab?: string, pane?: string}} */
 let kept = {};
 
@@ -85,12 +85,12 @@ function setTheme(theme) {
 
 const toggleTheme = () => setTheme(root.dataset.theme === "light" ? "dark" : "light");
 
-/** Choose the arrangement: "wide" has everything side by side, "low" the picture and one pane, "tall" the picture above one pane. */
+/** Choose the arrangement: "wide" has everything side by side, "low" the image and one pane, "tall" the image above one pane. */
 function takeShape() {
   const wide = innerWidth >= NARROW && innerHeight >= LOW;
   root.dataset.shape = wide ? "wide" : innerHeight > innerWidth ? "tall" : "low";
   element("divider-x").setAttribute("aria-orientation", root.dataset.shape === "tall" ? "horizontal" : "vertical");
-  element("divider-x").setAttribute("aria-label", root.dataset.shape === "tall" ? "Height of the picture" : "Width of the picture");
+  element("divider-x").setAttribute("aria-label", root.dataset.shape === "tall" ? "Height of the image" : "Width of the image");
   tellDividers();
   emit("box");
 }
@@ -102,7 +102,7 @@ function startPanes() {
 
 const paneButtons = () => /** @type {HTMLElement[]} */ ([...document.querySelectorAll("#panes button")]);
 
-/** Show a pane beside the picture where there is room for one only. @param {string} pane "picture" for none */
+/** Show a pane beside the image where there is room for one only. @param {string} pane "image" for none */
 function showPane(pane) {
   root.dataset.pane = pane;
   for (const button of paneButtons()) button.setAttribute("aria-pressed", String(button.dataset.pane === pane));
@@ -127,7 +127,7 @@ function keep(change) {
   }
 }
 
-/** The divider beside the picture, or below it in a tall window. @param {{clientX: number, clientY: number}} event */
+/** The divider beside the image, or below it in a tall window. @param {{clientX: number, clientY: number}} event */
 function followX(event) {
   const work = element("work").getBoundingClientRect();
   if (root.dataset.shape === "tall") keep({ split: clamp(event.clientY - 2 - work.top, 110, work.height - 120) / work.height });

@@ -13,10 +13,10 @@ export const state = {
   /** @type {import("../messages.js").PlacementRow[]} */ placements: [],
   placementsKnown: false,
   /** @type {import("../messages.js").Overlay|null} */ overlay: null,
-  /** Whether the recording has no pictures: it can be looked at from above, but not clicked in. */ looking: false,
+  /** Whether the recording has no images: it can be looked at from above, but not clicked in. */ looking: false,
   /** The returns of the last seconds. @type {import("../messages.js").RadarLook|null} */ look: null,
   /** @type {import("../messages.js").RadarMap|null} */ radarMap: null,
-  /** What is shown without pictures. @type {{trail_s: number, colour: "speed"|"amplitude", map: boolean, whole: boolean}} */
+  /** What is shown without images. @type {{trail_s: number, colour: "speed"|"amplitude", map: boolean, whole: boolean}} */
   lookOptions: { trail_s: 2, colour: "amplitude", map: true, whole: true },
   placementSummary: "",
   /** @type {import("../messages.js").Figure[]} */ placementFigures: [],
@@ -40,7 +40,7 @@ export const state = {
 };
 
 /** @typedef {{u: number, v: number, image_time?: import("../messages.js").Stamp, mark?: import("../messages.js").ClickRow["mark"]}} Draft A mark that the server does not have yet; a new one has a time. */
-/** A field of the picture, by its centre and size [px]. @typedef {{u: number, v: number, wide: number, high: number}} Field */
+/** A field of the image, by its centre and size [px]. @typedef {{u: number, v: number, wide: number, high: number}} Field */
 /** @typedef {{frame: number, u: number, v: number, touched: boolean, expected: boolean, fields: Field[]}} Cross `fields` from the widest to the present one */
 
 /** @type {Map<string, Set<() => void>>} */
@@ -54,10 +54,10 @@ export function on(topics, listener) {
   }
 }
 
-/** Listeners that wait for the next picture. @type {Set<() => void>} */
+/** Listeners that wait for the next image. @type {Set<() => void>} */
 const waiting = new Set();
 
-/** The same, once for all changes until the next picture is painted: a mark does not wait for a table. @param {Topic[]} topics @param {() => void} listener */
+/** The same, once for all changes until the next image is painted: a mark does not wait for a table. @param {Topic[]} topics @param {() => void} listener */
 export function onPainted(topics, listener) {
   on(topics, () => {
     if (!waiting.size) requestAnimationFrame(() => setTimeout(callWaiting));

@@ -3,7 +3,7 @@
  * a file.
  */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
@@ -20,9 +20,9 @@ const REPORT = "report";
 const IN_REPORT = [
   "Answer: verdict, transform both ways, error bars",
   "Cautions: warnings, and what to do",
-  "Uncertainty in the picture at 5, 20 and 60 m",
+  "Uncertainty in the image at 5, 20 and 60 m",
   "Residuals against range, azimuth, place and time",
-  "Coverage of picture and range",
+  "Coverage of image and range",
   "Pairs",
   "Provenance: files by their hashes, options, versions",
 ];
@@ -54,9 +54,9 @@ const retry = make("button", "second", "Try again");
 
 export function startExporting() {
   register(
-    { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withPictures },
-    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: () => openExport(), when: withPictures },
-    { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
+    { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withImages },
+    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: () => openExport(), when: withImages },
+    { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withImages },
   );
   try {
     kept = { ...kept, ...JSON.parse(localStorage.getItem(KEPT) ?? "{}") };
@@ -323,7 +323,7 @@ function importer() {
 
 /** FileNumbers of app/cocalib/web/exports.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
 /** CheckPointRow of app/cocalib/web/exports.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */
-/** How much of the picture's width the inset shows, and its shape. */
+/** How much of the image's width the inset shows, and its shape. */
 const INSET = 0.36;
 const INSET_ASPECT = 0.34;
 
@@ -358,7 +358,7 @@ function table({ title, rows }) {
   return make("table", "pose-numbers", [make("caption", "", title), ...lines]);
 }
 
-/** The check point: in a cut-out of the picture, and in one sentence. @param {CheckPoint|null} point */
+/** The check point: in a cut-out of the image, and in one sentence. @param {CheckPoint|null} point */
 function checkPoint(point) {
   if (!point) return [];
   const figure = make("figure", "check-point", [make("figcaption", "", [make("b", "", "Check point. "), point.words])]);
@@ -366,15 +366,15 @@ function checkPoint(point) {
   return [figure];
 }
 
-/** A cut-out of the picture around the check point, with a mark on it. @param {CheckPoint} point @param {() => void} failed */
+/** A cut-out of the image around the check point, with a mark on it. @param {CheckPoint} point @param {() => void} failed */
 function inset({ u_px, v_px, width_px, height_px, pair }, failed) {
   const width = Math.max(INSET * width_px, 160);
   const height = width * INSET_ASPECT;
   const [u, v] = [u_px + 0.5, v_px + 0.5]; // pixel (0, 0) is the centre of the first one
   const left = Math.max(0, Math.min(width_px - width, u - width / 2));
   const top = Math.max(0, Math.min(height_px - height, v - height / 2));
-  const svg = shape("svg", { viewBox: `${left} ${top} ${width} ${height}`, class: "inset", role: "img", "aria-label": "The check point in the picture" });
-  const image = shape("image", { href: `api/check_point_picture?${encodeURIComponent(pair)}`, width: width_px, height: height_px });
+  const svg = shape("svg", { viewBox: `${left} ${top} ${width} ${height}`, class: "inset", role: "img", "aria-label": "The check point in the image" });
+  const image = shape("image", { href: `api/check_point_image?${encodeURIComponent(pair)}`, width: width_px, height: height_px });
   image.addEventListener("error", failed);
   const radius = 0.035 * width;
   const arm = (/** @type {number} */ from, /** @type {number} */ to) => `M${u + from} ${v}H${u + to}M${u} ${v + from}V${v + to}`;

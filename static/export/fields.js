@@ -1,5 +1,5 @@
 /**
- * What the user fills in on the export panel: frame names, the radar's pose in a third frame, whether pictures are rectified; and the
+ * What the user fills in on the export panel: frame names, the radar's pose in a third frame, whether images are rectified; and the
  * drawing of the axes with the direction of the file's transform.
  */
 
@@ -100,8 +100,8 @@ export function parentFields(values, changed) {
   return row("parent", [label, make("div", "", inputs.map((input, index) => make("label", "", [index < 3 ? `${PARENT[index]} [m]` : PARENT[index], input])))]);
 }
 
-/** The user's statement that the pictures are rectified already, asked by formats that cannot hold distortion. It is kept for this
- * browser session only: the pictures of the next recording may differ. @param {() => void} changed */
+/** The user's statement that the images are rectified already, asked by formats that cannot hold distortion. It is kept for this
+ * browser session only: the images of the next recording may differ. @param {() => void} changed */
 export function rectifiedBox(changed) {
   const box = make("input", "", []);
   box.type = "checkbox";
@@ -118,8 +118,8 @@ export function rectifiedBox(changed) {
     }
     changed();
   });
-  const label = make("label", "", [box, "My pictures are rectified (undistorted with this K)"]);
-  label.dataset.hint = "The pictures were undistorted with this camera matrix and have no distortion left. This format cannot hold distortion coefficients.";
+  const label = make("label", "", [box, "My images are rectified (undistorted with this K)"]);
+  label.dataset.hint = "The images were undistorted with this camera matrix and have no distortion left. This format cannot hold distortion coefficients.";
   return { box, row: make("div", "rectified", [label]) };
 }
 

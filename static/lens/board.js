@@ -80,8 +80,8 @@ export function boardForm(start) {
     /** @param {import("../messages.js").LensState} lens @param {boolean} running */
     tell(lens, running) {
       go.textContent = lens.can_resume ? "Resume" : lens.result ? "Calibrate again" : "Calibrate";
-      go.disabled = running || !lens.pictures;
-      go.dataset.hint = lens.pictures ? `Looks for the board in the ${lens.pictures} pictures of this recording. You can go on clicking meanwhile.` : "There are no pictures in this recording.";
+      go.disabled = running || !lens.images;
+      go.dataset.hint = lens.images ? `Looks for the board in the ${lens.images} images of this recording. You can go on clicking meanwhile.` : "There are no images in this recording.";
     },
   };
 }

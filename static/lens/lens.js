@@ -2,12 +2,12 @@
  * The sheet "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, how far that is, and the result.
  */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { emit, on, state } from "../base/state.js";
-import { toggleRectified, withoutRectified } from "../picture/rectified.js";
+import { toggleRectified, withoutRectified } from "../image/rectified.js";
 import { boardForm } from "./board.js";
 import { drawCoverage, drawLensResult, lensResult, parameters, saveCamera, takeLensResult } from "./result.js";
 
@@ -23,8 +23,8 @@ let awaited = false;
 
 export function startLens() {
   register(
-    { id: "lens", group: "Panel", words: "Lens: intrinsics, and calibrating them from a board", also: "sheet camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showPage("lens"), when: withPictures },
-    { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
+    { id: "lens", group: "Panel", words: "Lens: intrinsics, and calibrating them from a board", also: "sheet camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showPage("lens"), when: withImages },
+    { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withImages() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
   );
   present.setAttribute("aria-label", "Intrinsics in use");
   startLensProgress(cancelLens);
@@ -37,7 +37,7 @@ export function startLens() {
 export function takeLens(message) {
   state.lens = message;
   if (state.recording) state.recording.intrinsics = message.intrinsics?.about ?? "";
-  if (!message.intrinsics && message.pictures && !led) showPage("lens");
+  if (!message.intrinsics && message.images && !led) showPage("lens");
   led = true;
   emit("lens");
 }
@@ -101,12 +101,12 @@ function drawPresent(lens) {
   const camera = lens.intrinsics;
   present.hidden = !camera && running();
   if (!camera) {
-    const words = lens.pictures
+    const words = lens.images
       ? "The lens is not known yet. Calibrate it here from a board in this recording, or drop a camera file on the page. Clicks can be placed already; the pose follows once the lens is known."
-      : "There are no pictures in this recording.";
+      : "There are no images in this recording.";
     return present.replaceChildren(make("h2", "", "No intrinsics"), make("p", "lens-none", words));
   }
-  const rectify = make("button", "second", state.rectified ? "Picture as taken" : "Rectified picture");
+  const rectify = make("button", "second", state.rectified ? "Image as taken" : "Rectified image");
   rectify.dataset.hint = "Straight edges must be straight in it. (U)";
   rectify.setAttribute("aria-pressed", String(state.rectified));
   rectify.disabled = withoutRectified() !== "";
@@ -128,12 +128,12 @@ function drawPresent(lens) {
 
 function drawPlots() {
   if (page.hidden || !state.lens) return;
-  const { imageWidth, imageHeight } = sizeOfPicture();
+  const { imageWidth, imageHeight } = sizeOfImage();
   drawMap(imageWidth, imageHeight);
 }
 
-/** The size of the recorded pictures. */
-const sizeOfPicture = () => ({ imageWidth: state.recording?.width_px ?? 0, imageHeight: state.recording?.height_px ?? 0 });
+/** The size of the recorded images. */
+const sizeOfImage = () => ({ imageWidth: state.recording?.width_px ?? 0, imageHeight: state.recording?.height_px ?? 0 });
 
 const lensProgress = make("section", "lens-progress", []);
 const bar = make("progress", "", []);
@@ -147,7 +147,7 @@ const coverageRow = make("div", "lens-coverage", []);
 /** @param {() => void} stop called by the button that cancels */
 function startLensProgress(stop) {
   lensProgress.setAttribute("aria-label", "Progress");
-  bar.setAttribute("aria-label", "Pictures searched");
+  bar.setAttribute("aria-label", "Images searched");
   map.setAttribute("role", "img");
   cancel.onclick = stop;
   lensProgress.append(barRow, words, missing, coverageRow);
@@ -173,20 +173,20 @@ function drawProgress(lens) {
   if (lens.coverage) coverageRow.replaceChildren(map, tallies(lens.coverage));
 }
 
-/** Draw where the board was. @param {number} wide of a picture @param {number} high */
+/** Draw where the board was. @param {number} wide of an image @param {number} high */
 function drawMap(wide, high) {
   const coverage = state.lens?.coverage;
   if (!coverage || !map.isConnected) return;
   drawCoverage(map, coverage, wide, high);
-  map.setAttribute("aria-label", `Where the board was in the picture: ${Math.round(100 * coverage.share)} % is covered`);
+  map.setAttribute("aria-label", `Where the board was in the image: ${Math.round(100 * coverage.share)} % is covered`);
 }
 
 /** @param {import("../messages.js").LensState} lens @returns {string|(HTMLElement|string)[]} */
 function progressWords(lens) {
-  const found = `the board was found in ${lens.views} of ${lens.searched} pictures`;
+  const found = `the board was found in ${lens.views} of ${lens.searched} images`;
   const sentence = found[0].toUpperCase() + found.slice(1);
   const left = lens.left_out ? `, ${lens.left_out} left out` : "";
-  if (lens.stage === "searching") return lens.total ? `Searching at least ${lens.total} pictures: ${found}${left}.` : "Looking for the board…";
+  if (lens.stage === "searching") return lens.total ? `Searching at least ${lens.total} images: ${found}${left}.` : "Looking for the board…";
   if (lens.stage === "calibrating") return `${sentence}${left}. ${lens.doing || "Calibrating the lens"}…`;
   if (lens.stage === "cancelled") return `Cancelled: ${found}. They are kept: Resume goes on from them.`;
   if (lens.stage === "failed") return [make("strong", "", lens.problem), lens.hint ? ` ${lens.hint}` : ""];
@@ -197,6 +197,6 @@ function progressWords(lens) {
 function tallies(coverage) {
   const row = (/** @type {string} */ name, /** @type {Record<string, number>} */ counts) =>
     make("div", "", [make("dt", "", name), make("dd", "", Object.entries(counts).map(([one, count]) => make("span", count ? "" : "none", `${one} ${count}`)))]);
-  const share = make("div", "", [make("dt", "", "Covered"), make("dd", "", [make("span", "", `${Math.round(100 * coverage.share)} % of the picture`)])]);
+  const share = make("div", "", [make("dt", "", "Covered"), make("dd", "", [make("span", "", `${Math.round(100 * coverage.share)} % of the image`)])]);
   return make("dl", "lens-tallies", [share, row("Turned", coverage.tilts), row("Distance", coverage.distances)]);
 }

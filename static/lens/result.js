@@ -1,6 +1,6 @@
 /**
  * The result of calibrating the lens: the model and why, how well it fits, every view, what was left out; and the plots over the area of
- * the picture: where the board was, residuals, uncertainty.
+ * the image: where the board was, residuals, uncertainty.
  */
 
 import { ask, content, saveFile } from "../base/asking.js";
@@ -9,7 +9,7 @@ import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { emit, on, said, state } from "../base/state.js";
-import { toDevice, viewport } from "../picture/geometry.js";
+import { toDevice, viewport } from "../image/geometry.js";
 import { goTo, pause } from "../time/player.js";
 
 /** A corner in the frame: where, its residual, and whether it was used. @typedef {[number, number, number, number, boolean]} Corner */
@@ -104,8 +104,8 @@ function figures(found) {
   const rows = [
     ["RMS", px(found.rms_px), "px", "Root mean square distance between found and projected corners."],
     ["RMS of left-out views", px(found.held_out_rms_px), "px", "The same for each view with the lens calibrated from all others: what to expect of a view that was not used. Much more than the RMS means too few views or a lens model that is too rich."],
-    ["Views", String(found.views.length), "", "Pictures that were used."],
-    ["Left out", String(found.left_out.length), "", "Pictures that were not used; below with the reason."],
+    ["Views", String(found.views.length), "", "Images that were used."],
+    ["Left out", String(found.left_out.length), "", "Images that were not used; below with the reason."],
   ];
   return make("dl", "lens-figures", rows.map(([name, value, unit, hint]) => {
     const one = make("div", "figure", [make("dt", "", name), make("dd", "", [value, make("span", "unit", unit)])]);
@@ -127,12 +127,12 @@ function table(caption, heads, rows, frames, name = "") {
 
 /** @param {import("../messages.js").LensResult} found */
 function views(found) {
-  return table(`${found.views.length} views, those that fit worst first`, ["Picture", "RMS", "left out"], found.views.map((view) => [frameButton(view.name), px(view.rms_px), px(view.held_out_rms_px)]), found.views.map((view) => view.frame));
+  return table(`${found.views.length} views, those that fit worst first`, ["Image", "RMS", "left out"], found.views.map((view) => [frameButton(view.name), px(view.rms_px), px(view.held_out_rms_px)]), found.views.map((view) => view.frame));
 }
 
 /** @param {import("../messages.js").LensResult} found */
 function leftOut(found) {
-  return table(`${found.left_out.length} pictures left out`, ["Picture", "Why"], found.left_out.map((one) => [frameButton(one.name), one.reason]), found.left_out.map((one) => one.index), "reasons");
+  return table(`${found.left_out.length} images left out`, ["Image", "Why"], found.left_out.map((one) => [frameButton(one.name), one.reason]), found.left_out.map((one) => one.index), "reasons");
 }
 
 /** @param {import("../messages.js").LensResult} found */
@@ -195,7 +195,7 @@ const FULL = 20;
 /** The length of a typical arrow, as a part of the plot's width. */
 const ARROW = 0.03;
 
-/** Make a canvas as large as it is shown, with the picture's shape. @param {HTMLCanvasElement} canvas @param {number} wide @param {number} high of the picture @returns {Ink|null} */
+/** Make a canvas as large as it is shown, with the image's shape. @param {HTMLCanvasElement} canvas @param {number} wide @param {number} high of the image @returns {Ink|null} */
 function paper(canvas, wide, high) {
   const width = canvas.clientWidth;
   if (!width || !wide) return null;
@@ -211,7 +211,7 @@ function paper(canvas, wide, high) {
 /** Call for each value of a grid with its column and row. @param {number[][]} grid @param {(value: number, column: number, row: number) => void} draw */
 const eachCell = (grid, draw) => grid.forEach((values, row) => values.forEach((value, column) => draw(value, column, row)));
 
-/** How many corners were in each part of the picture. @param {HTMLCanvasElement} canvas @param {import("../messages.js").Coverage} coverage @param {number} wide @param {number} high */
+/** How many corners were in each part of the image. @param {HTMLCanvasElement} canvas @param {import("../messages.js").Coverage} coverage @param {number} wide @param {number} high */
 export function drawCoverage(canvas, coverage, wide, high) {
   const pen = paper(canvas, wide, high);
   if (!pen) return;
@@ -268,7 +268,7 @@ function rounded(value) {
   return Math.max(1, Math.floor(value / ten) * ten);
 }
 
-/** The standard deviation of a projection as colours, by its logarithm: it grows fast towards the corners. @param {HTMLCanvasElement} canvas @param {import("../messages.js").PictureGrid} grid @param {number} wide @param {number} high @returns {[number, number]} the smallest and the largest value [px] */
+/** The standard deviation of a projection as colours, by its logarithm: it grows fast towards the corners. @param {HTMLCanvasElement} canvas @param {import("../messages.js").ImageGrid} grid @param {number} wide @param {number} high @returns {[number, number]} the smallest and the largest value [px] */
 function drawUncertainty(canvas, grid, wide, high) {
   const { sigma_px } = grid;
   const known = sigma_px.flat().filter((value) => value !== null && Number.isFinite(value));

@@ -15,7 +15,7 @@ import { on, said, state } from "../base/state.js";
 /** Files of intrinsics have a few kB; the server refuses more than this as well. */
 const MAX_FILE_BYTES = 512 * 1024;
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("opening-dialog"));
-const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
+const pane = /** @type {HTMLElement} */ (document.getElementById("image-pane"));
 const strip = make("div", "", "");
 /** What is to be known of the recording that is open; pairs/warnings.js draws it. */
 export const notes = make("section", "notes", []);
@@ -232,7 +232,7 @@ function drawStrip() {
   strip.hidden = true;
   if (!recording) return;
   const radars = recording.warnings.find((warning) => warning.code === "several-radars");
-  if (recording.has_pictures && !recording.intrinsics) askIntrinsics();
+  if (recording.has_images && !recording.intrinsics) askIntrinsics();
   else if (radars && !recording.session.restored_clicks) askRadar(said(radars.message));
 }
 
@@ -418,7 +418,7 @@ function browser({ choices, draft, folder, redraw, enter }) {
     if (kind === "recording") return [row];
     return kind === "folder" ? [way(`${name} /`, path)] : [row, way(`look into ${name} /`, path)];
   });
-  const itself = folder.path === "" ? [] : [option({ group: "path", kind: "checkbox", label: "this folder itself", about: "pictures, radar files, data sets", checked: draft.paths.has(folder.path), choose: () => toggle(/** @type {NonNullable<typeof folder>} */ (folder).path) })];
+  const itself = folder.path === "" ? [] : [option({ group: "path", kind: "checkbox", label: "this folder itself", about: "images, radar files, data sets", checked: draft.paths.has(folder.path), choose: () => toggle(/** @type {NonNullable<typeof folder>} */ (folder).path) })];
   const note = folder.note ? [make("p", "none", folder.note)] : [];
   const chosen = draft.paths.size > 1 ? [make("p", "why", `${draft.paths.size} files are opened as one recording.`)] : [];
   return section(folder.path ? `${choices.root} / ${folder.path}` : choices.root, [...up, ...itself, ...rows, ...note, ...chosen]);

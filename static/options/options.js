@@ -1,6 +1,6 @@
 /** The options, built from the server's descriptions: the most used first, all others below. */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make, settled, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
@@ -68,7 +68,7 @@ const writers = new Map();
 let sending = 0;
 
 export function startOptions() {
-  register({ id: "options", group: "Panel", words: "Options", also: "sheet settings parameters method", run: () => showPage("options"), when: withPictures });
+  register({ id: "options", group: "Panel", words: "Options", also: "sheet settings parameters method", run: () => showPage("options"), when: withImages });
   on(["recording"], build);
   onPainted(["view"], () => void (sending || fill()));
 }

@@ -9,10 +9,10 @@ const ARROWS = ["←", "→", "↑", "↓"];
 /** @type {[string, string][]} */
 const MOUSE = [
   ["wheel", "Zoom at the cursor"],
-  ["drag", "Pan the picture"],
+  ["drag", "Pan the image"],
   ["click", "Place the mark for this frame"],
   ["drag a mark", "Move it"],
-  ["drag", "In the rectified picture: a line along a straight edge; Shift+drag pans"],
+  ["drag", "In the rectified image: a line along a straight edge; Shift+drag pans"],
   ["Alt wheel", "Loupe: magnify more or less"],
   ["wheel", "On the timeline: zoom; with Shift: pan"],
   ["double click", "On the timeline: show all of it"],
@@ -60,7 +60,7 @@ function build() {
     make("p", "note", ["For everything else there is the ", docs, "."]),
     close,
     make("div", "groups", [...groups, part("Mouse", MOUSE.map(([hand, does]) => [[hand], does]))]),
-    make("h3", "", "Marks in the picture"),
+    make("h3", "", "Marks in the image"),
     legend,
     note(),
   );

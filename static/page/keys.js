@@ -5,7 +5,7 @@
 
 import { act, ACTIONS } from "../base/actions.js";
 import { state } from "../base/state.js";
-import { crossTakes } from "../picture/cross.js";
+import { crossTakes } from "../image/cross.js";
 import { shownOffer } from "../proposals/proposals.js";
 
 /** Keys that stay with the page even where a field has the focus. */

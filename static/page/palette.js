@@ -5,7 +5,7 @@ import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
 import { clicks, isClicked, nameOf, select, state } from "../base/state.js";
 import { openOption, optionRows } from "../options/options.js";
-import { comeTo } from "../picture/arriving.js";
+import { comeTo } from "../image/arriving.js";
 import { goTo, nearestIndex, pause } from "../time/player.js";
 
 const KEPT = "cocalib-recent";

@@ -5,8 +5,8 @@
 
 import { icon, make } from "../base/notices.js";
 import { on, onPainted, state } from "../base/state.js";
-import { toDevice, viewport, zoom } from "../picture/geometry.js";
-import { fit } from "../picture/picture.js";
+import { toDevice, viewport, zoom } from "../image/geometry.js";
+import { fit } from "../image/image.js";
 import { searchWords } from "../proposals/proposals.js";
 
 /** @param {string} id */
@@ -43,7 +43,7 @@ function drawRecording() {
   const received = recording.sensors.filter(({ clock }) => clock === "receive").map(({ name }) => name); // they include the driver's delay
   get("recording-topics").textContent = received.length ? `receive time: ${received.join(", ")}` : "";
   get("status-right").textContent = `cocalib ${recording.version}`;
-  get("status-right").dataset.hint = recording.has_pictures ? `Every click is saved immediately in\n${recording.session.folder}` : "Nothing is saved: there are no pictures to click in.";
+  get("status-right").dataset.hint = recording.has_images ? `Every click is saved immediately in\n${recording.session.folder}` : "Nothing is saved: there are no images to click in.";
 }
 
 function drawStatus() {
@@ -104,7 +104,7 @@ function drawReadout() {
   const percent = `${Math.round(zoom() * 100)} %`;
   get("zoom").hidden = !state.shown;
   get("zoom").replaceChildren(percent, ...(viewport.fitted ? [] : [make("kbd", "", "F"), make("span", "", "fit")]));
-  get("zoom").setAttribute("aria-label", `${percent}: fit the picture`);
+  get("zoom").setAttribute("aria-label", `${percent}: fit the image`);
   const parts = [];
   if (point && !state.playing) parts.push(`u ${point.u.toFixed(1)}  v ${point.v.toFixed(1)}`);
   const near = point ? nearReturn(point) : null;

@@ -4,7 +4,7 @@ import { act, actionNamed } from "../base/actions.js";
 import { make } from "../base/notices.js";
 import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state } from "../base/state.js";
 import { openOption } from "../options/options.js";
-import { comeTo } from "../picture/arriving.js";
+import { comeTo } from "../image/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { goToPair } from "./pairs.js";
@@ -30,7 +30,7 @@ function keyPart({ key, label, action, pair, frame, option }) {
 }
 
 function drawGuide() {
-  if (state.looking) return; // picture/birdseye.js says what is there
+  if (state.looking) return; // image/birdseye.js says what is there
   const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
   guide.hidden = !words;
   if (!words) return;
@@ -58,7 +58,7 @@ const NEXT = { key: "N", label: "next place", action: "next-placement" };
 
 /** @param {number} index @returns {Advice|null} */
 function advice(index) {
-  if (state.rectified) return { text: ["Straight edges must be straight: drag a line along one.", { key: "U", label: "picture as taken", action: "rectify" }], act: false };
+  if (state.rectified) return { text: ["Straight edges must be straight: drag a line along one.", { key: "U", label: "image as taken", action: "rectify" }], act: false };
   const placement = placementAt(index);
   const here = clickIn(index);
   if (state.cross) return atCross(state.cross);

@@ -1,15 +1,15 @@
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { LARGE_PX, residualColour } from "../base/colours.js";
 import { showPage } from "../base/layout.js";
 import { make, shape } from "../base/notices.js";
 import { clickIn, clicks, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
-import { withSelected } from "../picture/actions.js";
-import { comeTo } from "../picture/arriving.js";
-import { candidatesOf, choose } from "../picture/candidates.js";
-import { toggleExcluded } from "../picture/clicking.js";
-import { dismissHere, withoutPlacement } from "../picture/dismissing.js";
+import { withSelected } from "../image/actions.js";
+import { comeTo } from "../image/arriving.js";
+import { candidatesOf, choose } from "../image/candidates.js";
+import { toggleExcluded } from "../image/clicking.js";
+import { dismissHere, withoutPlacement } from "../image/dismissing.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** So many candidates are listed; the others are less probable. */
@@ -29,7 +29,7 @@ const COLUMNS = [
 const body = make("tbody", "", []);
 const head = make("thead", "", []);
 const table = make("table", "pairs", [head, body]);
-const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
+const withResiduals = () => withImages() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 /** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
 const made = new Map();
 /** The click whose row was scrolled to last. @type {string|null} */
@@ -41,7 +41,7 @@ export function startPairs() {
   register(
     { id: "mark", group: "Panel", words: "Mark: the pairs and the returns that each may use", also: "tab table list clicks placements candidates", run: () => showPage("mark") },
     { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-    { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+    { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withImages() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
   );
   onPainted(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
@@ -77,7 +77,7 @@ export function goToPair(id) {
 }
 
 function draw() {
-  if (state.looking) return; // picture/birdseye.js shows the placements
+  if (state.looking) return; // image/birdseye.js shows the placements
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
   const text = JSON.stringify([sorting, rows.length > 0]);
@@ -237,7 +237,7 @@ const word = (click) => ({ unpaired: "no return", pending: "…", untouched: "gu
 
 /** @param {Click} click */
 function explain(click) {
-  const how = { clicked: "click", moved: "moved mark", snapped: "mark on the corner found in the picture", untouched: "guess" }[click.mark];
+  const how = { clicked: "click", moved: "moved mark", snapped: "mark on the corner found in the image", untouched: "guess" }[click.mark];
   const lines = [`${nameOf(click.id)}: ${how} at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.sigma_px !== null) lines.push(`its own standard deviation: ${click.sigma_px.toFixed(2)} px`);

@@ -154,7 +154,7 @@ function draw() {
   const close = make("button", "icon close", "×");
   close.setAttribute("aria-label", "Close");
   close.onclick = () => dialog.close();
-  const why = make("p", "why", "The file does not state it. Pick the picture in which the radar returns lie on what they come from; other frames may tell more.");
+  const why = make("p", "why", "The file does not state it. Pick the image in which the radar returns lie on what they come from; other frames may tell more.");
   const rows = make("div", "meanings", known.rows.map(card));
   dialog.replaceChildren(make("div", "top", [title, close]), why, frames(), rows);
 }
@@ -167,7 +167,7 @@ function frames() {
   slider.setAttribute("aria-label", "Frame to draw on");
   slider.onchange = () => {
     frame = Number(slider.value);
-    dialog.querySelectorAll("img").forEach((picture, number) => (picture.src = address(number)));
+    dialog.querySelectorAll("img").forEach((image, number) => (image.src = address(number)));
   };
   return make("label", "frames", [make("span", "", "frame"), slider]);
 }
@@ -177,11 +177,11 @@ const address = (number) => `/api/meaning.jpg?number=${number}&frame=${frame}`;
 
 /** @param {Row} row @param {number} number */
 function card(row, number) {
-  const picture = make("img", "", []);
-  picture.src = address(number);
-  picture.alt = `Returns under ${row.meaning}: ${row.mounting}`;
+  const image = make("img", "", []);
+  image.src = address(number);
+  image.alt = `Returns under ${row.meaning}: ${row.mounting}`;
   const shown = row.is_shown ? [make("em", "", "Shown now")] : [];
-  const parts = [picture, make("strong", "", `${row.score}: ${row.mounting}`), make("small", "", row.words), ...shown];
+  const parts = [image, make("strong", "", `${row.score}: ${row.mounting}`), make("small", "", row.words), ...shown];
   if (known && new Set(known.rows.map((one) => one.place)).size > 1) parts.push(make("small", "", `at ${row.place}`));
   const button = make("button", "meaning", parts);
   button.dataset.meaning = row.meaning;

@@ -1,8 +1,8 @@
 /** Draws a proposal on the frame: a dashed cross with its 95 % ring, and faint numbers at the other places once one was asked for. */
 
 import { ink, smallFont } from "../base/colours.js";
-import { toDevice, viewport } from "../picture/geometry.js";
-import { cross, outlined } from "../picture/marks.js";
+import { toDevice, viewport } from "../image/geometry.js";
+import { cross, outlined } from "../image/marks.js";
 import { shownOffer } from "./proposals.js";
 
 /** A ring of this many standard deviations contains 95 %. */

@@ -1,5 +1,5 @@
 /**
- * Proposals of where the reflector stood, one placement at a time: N goes to the next one, Enter accepts what the picture shows, C
+ * Proposals of where the reflector stood, one placement at a time: N goes to the next one, Enter accepts what the image shows, C
  * takes another place, X says that it is not the reflector, a click puts the mark elsewhere. They are found on the server.
  */
 
@@ -7,9 +7,9 @@ import { toast } from "../base/notices.js";
 import { offers } from "../base/offers.js";
 import { send } from "../base/socket.js";
 import { clickIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
-import { dismiss } from "../picture/dismissing.js";
-import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../picture/geometry.js";
-import { fit, redraw } from "../picture/picture.js";
+import { dismiss } from "../image/dismissing.js";
+import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../image/geometry.js";
+import { fit, redraw } from "../image/image.js";
 import { goTo, pause } from "../time/player.js";
 
 /** @typedef {import("../messages.js").ProposalRow} Row */
@@ -50,7 +50,7 @@ let over = false;
 
 /** A proposal this sure is what the page opens on, if it is ready by then. */
 const SURE = 0.9;
-/** Whether the picture may still move by itself: nothing was pressed, and it is not the one that was there before a reload. */
+/** Whether the image may still move by itself: nothing was pressed, and it is not the one that was there before a reload. */
 let isFresh = sessionStorage.getItem("cocalib-frame") === null;
 
 export function startProposals() {
@@ -231,7 +231,7 @@ function isInView({ row, place }) {
   return state.shown?.index === row.frame && x >= 0 && y >= 0 && x <= viewport.width && y <= viewport.height;
 }
 
-/** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
+/** Enter: what the image shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
   if (!takesKeys()) return void (heldBack() || nextProposal());
   const offer = seenOffer();
@@ -322,13 +322,13 @@ function settle() {
   if (row) show(row);
 }
 
-/** What is shown of the picture around a proposal: so many widths of the reflector, and at least this part of the picture. */
+/** What is shown of the image around a proposal: so many widths of the reflector, and at least this part of the image. */
 const WIDTHS = 9;
 const PART = 0.1;
 /** Room below a proposal for the line on the frame, so that it does not cover the reflector [CSS px]. */
 const BELOW = 120;
 
-/** The middle of a view of a place, such that the picture fills the view if it can. @param {number} at image px @param {number} box CSS px @param {number} size image px */
+/** The middle of a view of a place, such that the image fills the view if it can. @param {number} at image px @param {number} box CSS px @param {number} size image px */
 function within(at, box, size) {
   const half = box / zoom() / 2;
   return half > size / 2 ? (size - 1) / 2 : Math.min(size - 0.5 - half, Math.max(half - 0.5, at));
@@ -340,7 +340,7 @@ function zoomInto({ row, place }) {
   const [u, v] = place.pixel_px;
   lookInto(u, v, field, field);
   lookAt(within(u, viewport.width, viewport.imageWidth), within(v, viewport.height, viewport.imageHeight));
-  const below = document.documentElement.dataset.shape === "tall" ? 0 : BELOW; // there the line is below the picture
+  const below = document.documentElement.dataset.shape === "tall" ? 0 : BELOW; // there the line is below the image
   pan(0, Math.min(0, viewport.height - below - toCss(u, v)[1]));
   redraw();
   emit("box");

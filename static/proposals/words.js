@@ -1,18 +1,18 @@
 /** What is said of proposals: the line on the frame, how far they are, why there are none; and their switch, a chip among the layers. */
 
-import { attemptFirst, register, withPictures } from "../base/actions.js";
+import { attemptFirst, register, withImages } from "../base/actions.js";
 import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { isOffered, on, state } from "../base/state.js";
-import { marks } from "../picture/picture.js";
+import { marks } from "../image/image.js";
 import { drawProposal } from "./marks.js";
 import { acceptProposal, heldBack, isSearching, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, saidWords, say, shownOffer, takesEnter, takesKeys } from "./proposals.js";
 
 /** A key and what it does; with an action it can be pressed here too, a pair or a frame is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, frame?: number, option?: string}} Key */
 /** Text with keys in between. @typedef {(string|Key)[]} Words */
 
-/** So many clicks show what the reflector looks like, where the pictures alone propose nothing. */
+/** So many clicks show what the reflector looks like, where the images alone propose nothing. */
 const FIRST = 2;
 
 /** How many placements wait: with proposals those that were found, without any all; nothing while they are being searched for. */
@@ -65,7 +65,7 @@ function progressWords() {
   if (!news?.on) return "";
   if (news.progress.problem) return [news.progress.problem, news.progress.hint].filter(Boolean).join(" ");
   if (news.progress.stage === "off") return "Waits for the placements in the radar data.";
-  if (news.progress.stage === "looking") return `Looks at the pictures of placement ${Math.min(news.progress.done + 1, news.progress.count)} of ${news.progress.count}.`;
+  if (news.progress.stage === "looking") return `Looks at the images of placement ${Math.min(news.progress.done + 1, news.progress.count)} of ${news.progress.count}.`;
   if (news.progress.stage === "comparing") return `Compares ${news.progress.done} of ${news.progress.count} placements with what was confirmed.`;
   return `${openProposals().length} to decide${news.unproposed.length ? `; for ${news.unproposed.length} nothing can be proposed` : ""}.`;
 }
@@ -75,7 +75,7 @@ let chip;
 
 export function startSwitch() {
   addLayer("proposal", drawProposal);
-  register({ id: "proposals", group: "Mark", words: "Suggestions on or off", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures });
+  register({ id: "proposals", group: "Mark", words: "Suggestions on or off", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withImages });
   attemptFirst("next-placement", () => nextProposal() || (sayNone(), false));
   attemptFirst("previous-placement", previousProposal);
   attemptFirst("place-mark", () => takesEnter() && !state.cross && (acceptProposal(), true));
@@ -85,7 +85,7 @@ export function startSwitch() {
   chip.dataset.layer = "proposals";
   chip.onclick = (event) => {
     toggleProposals();
-    if (event.detail) /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true }); // Enter is for the picture then
+    if (event.detail) /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true }); // Enter is for the image then
   };
   document.getElementById("layers")?.append(chip);
   drawChip();
@@ -105,5 +105,5 @@ function drawChip() {
   chip.setAttribute("aria-pressed", String(Boolean(news?.on)));
   chip.classList.toggle("troubled", Boolean(news?.on && news.progress.problem));
   chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.progress.done}/${news.progress.count}` : news?.on && news.progress.problem ? "Proposals: none" : "Proposals");
-  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the picture shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
+  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the image shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
 }

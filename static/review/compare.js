@@ -1,10 +1,10 @@
-/** Two solutions side by side: chosen here, compared by the server, drawn over the picture with two shapes. */
+/** Two solutions side by side: chosen here, compared by the server, drawn over the image with two shapes. */
 
 import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { tell } from "../base/socket.js";
 import { clicksIn, emit, nameOf, on, state } from "../base/state.js";
-import { toDevice, viewport } from "../picture/geometry.js";
+import { toDevice, viewport } from "../image/geometry.js";
 import { visible } from "./review.js";
 
 /** @typedef {import("../messages.js").CompareWanted["a"]} Kind */
@@ -62,12 +62,12 @@ export function startCompare() {
   verdict.setAttribute("role", "status");
   slider.type = "range";
   Object.assign(slider, { min: "0", max: "1", step: "0.05", value: String(blend) });
-  slider.setAttribute("aria-label", "Blend between A and B in the picture");
+  slider.setAttribute("aria-label", "Blend between A and B in the image");
   slider.oninput = () => {
     blend = Number(slider.value);
     emit("layers");
   };
-  blending.append(make("span", "", "in the picture: A"), slider, make("span", "", "B"));
+  blending.append(make("span", "", "in the image: A"), slider, make("span", "", "B"));
   document.getElementById("page-review")?.append(box);
   listenToDrops();
   on(["view", "selected"], refresh);

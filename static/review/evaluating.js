@@ -3,7 +3,7 @@
  * Acc, each class, and how Acc changes when the camera is turned, which says what it can see at all.
  */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
@@ -27,9 +27,9 @@ let panel = null;
 
 export function startEvaluating() {
   register(
-    { id: "evaluate", group: "Panel", words: "Evaluate: judge the calibration by boxes around what moves, or go back", keys: ["A"], also: "sheet boxes annotations acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
-    { id: "find-moving", group: "Panel", words: "Evaluate: find what moves before a camera that stands still", also: "boxes motion detect", run: findMoving, when: withPictures },
-    { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+    { id: "evaluate", group: "Panel", words: "Evaluate: judge the calibration by boxes around what moves, or go back", keys: ["A"], also: "sheet boxes annotations acc accuracy bounding people cars moving", run: toggleEvaluate, when: withImages },
+    { id: "find-moving", group: "Panel", words: "Evaluate: find what moves before a camera that stands still", also: "boxes motion detect", run: findMoving, when: withImages },
+    { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withImages },
   );
   const load = make("button", "second", "Load boxes…");
   load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on this sheet does the same.";

@@ -1,11 +1,11 @@
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
-import { register, withPictures } from "../base/actions.js";
+import { register, withImages } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make } from "../base/notices.js";
 import { tell } from "../base/socket.js";
 import { clicks, nameOf, on, said, select, state } from "../base/state.js";
-import { comeTo } from "../picture/arriving.js";
+import { comeTo } from "../image/arriving.js";
 import { Plot } from "./plots.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
@@ -61,7 +61,7 @@ const wordsLine = make("p", "review-words", "");
 const why = make("section", "review-pair", []);
 
 export function startReview() {
-  register({ id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withPictures });
+  register({ id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withImages });
   readout.id = "review-readout";
   readout.setAttribute("aria-live", "polite");
   const listener = { hover: hovered, go, brush };
@@ -75,7 +75,7 @@ export function startReview() {
   drawFilters();
   new ResizeObserver(() => visible() && drawPlots()).observe(grid);
   on(["view", "selected", "theme", "recording"], refresh);
-  on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the picture is moved
+  on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the image is moved
   on(["connection"], () => {
     asked.review = asked.pair = "";
     refresh();

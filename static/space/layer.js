@@ -1,6 +1,6 @@
 /**
  * What the page draws over the 3D view: labels, range numbers, placements, the mark under the pointer and what that is in words; and the
- * Camera view, the page's own picture with the returns in front of it, projected by the server through the same lens.
+ * Camera view, the page's own image with the returns in front of it, projected by the server through the same lens.
  */
 
 import { degrees, sideways, upwards } from "../base/angles.js";
@@ -77,8 +77,8 @@ let told = () => {};
 /** @param {() => void} listener */
 export const onDrawn = (listener) => (told = listener);
 
-/** Where the page's picture is in the Camera view; null without one. @returns {{left: number, top: number, scale: number}|null} */
-export function pictureBox() {
+/** Where the page's image is in the Camera view; null without one. @returns {{left: number, top: number, scale: number}|null} */
+export function imageBox() {
   const shown = state.shown;
   if (!shown) return null;
   const scale = Math.min(layer.clientWidth / shown.width, layer.clientHeight / shown.height);
@@ -88,7 +88,7 @@ export function pictureBox() {
 /** From a thing's place in space and its pixel to CSS px of the view. @returns {((position: readonly number[], pixel: readonly (number|null)[]|null) => [number, number]|null)|null} */
 function placing() {
   if (!spaceOptions.camera) return projection(layer.clientWidth, layer.clientHeight);
-  const box = pictureBox();
+  const box = imageBox();
   if (!box) return null;
   return (_position, pixel) => (pixel && pixel[0] !== null && pixel[1] !== null ? [box.left + (pixel[0] + 0.5) * box.scale, box.top + (pixel[1] + 0.5) * box.scale] : null);
 }
@@ -195,11 +195,11 @@ function drawLook(look, place, board) {
   for (const { range, x, y } of ringPlaces(look.rings_m, look.ground_m, project, board, size)) write(words(range), x, y, "muted");
 }
 
-/** The page's own picture, as large as it fits. @param {Look|null} look */
+/** The page's own image, as large as it fits. @param {Look|null} look */
 function paintFrame(look) {
   pen.fillStyle = themeColour("ground");
   pen.fillRect(0, 0, layer.clientWidth, layer.clientHeight);
-  const [box, shown] = [pictureBox(), state.shown];
+  const [box, shown] = [imageBox(), state.shown];
   if (!box || !shown) return;
   pen.imageSmoothingQuality = state.playing ? "low" : "high";
   pen.drawImage(shown.bitmap, box.left, box.top, shown.width * box.scale, shown.height * box.scale);

@@ -28,7 +28,7 @@ export function changeSpace(change) {
   }
 }
 
-/** What the colours mean: what was chosen here, else without pictures the same as seen from above. @returns {NonNullable<Colour>} */
+/** What the colours mean: what was chosen here, else without images the same as seen from above. @returns {NonNullable<Colour>} */
 export const spaceColour = () => spaceOptions.colour ?? (state.looking ? state.lookOptions.colour : "speed");
 
 /** What the server is told with every cursor. */

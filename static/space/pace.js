@@ -1,7 +1,7 @@
 /**
  * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can and shares its thread with our page;
- * without a graphics card, every drawing delays the picture. The 3D view therefore draws at full rate only while the user moves
- * it, the picture has priority, and nothing is drawn once nothing has arrived, moved or changed size for a while.
+ * without a graphics card, every drawing delays the image. The 3D view therefore draws at full rate only while the user moves
+ * it, the image has priority, and nothing is drawn once nothing has arrived, moved or changed size for a while.
  */
 {
   /** Minimum time between two drawings [ms]. */
@@ -9,7 +9,7 @@
   const PLAYING = 1000;
   /** How long after the last input the view counts as being moved [ms]. */
   const TOUCH = 1200;
-  /** How long after something arrived or moved it may still change what is drawn [ms]: pictures are decoded meanwhile. */
+  /** How long after something arrived or moved it may still change what is drawn [ms]: images are decoded meanwhile. */
   const AWAKE = 3000;
   /** So often is drawn after that however long it takes: viser shows some of what arrives with the second drawing only. */
   const LEAST = 3;

@@ -1,13 +1,13 @@
 /** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
-import { opened, register, withPictures } from "../base/actions.js";
+import { opened, register, withImages } from "../base/actions.js";
 import { icon, make } from "../base/notices.js";
 import { tab, tell } from "../base/socket.js";
 import { clicks, on, select, state } from "../base/state.js";
-import { comeTo } from "../picture/arriving.js";
-import { choose } from "../picture/candidates.js";
+import { comeTo } from "../image/arriving.js";
+import { choose } from "../image/candidates.js";
 import { addToCursor, tellCursor } from "../time/player.js";
-import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./layer.js";
+import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, imageBox, redraw, startLayer, takeLook } from "./layer.js";
 import { changeSpace, cursorOptions, spaceColour, spaceOptions } from "./options.js";
 
 /** @typedef {import("./options.js").Colour} Colour */
@@ -28,7 +28,7 @@ const THRESHOLD = 4;
 /** How long the 3D view waits after input on the page, so that mark and overlay are painted first [ms]. */
 const HOLD = 250;
 
-/** Time between two drawings while playing, with and without pictures [ms]. */
+/** Time between two drawings while playing, with and without images [ms]. */
 const [PLAYING_EVERY, LOOKING_EVERY] = [1000, 340];
 /** When the 3D view is loaded at the latest, counted from the recording's description: its first frame may be unreadable [ms]. */
 const LATEST = 3000;
@@ -40,7 +40,7 @@ const SPACE = { group: "3D view", when: opened };
 
 /** What pace.js reads in the 3D view's frame. */
 const pace = { playing: false, every: 1000, holdUntil: 0 };
-const cameraChip = chip("Camera", "The page's own picture with the radar returns in front of it, through the same lens.", () => setCamera(!spaceOptions.camera));
+const cameraChip = chip("Camera", "The page's own image with the radar returns in front of it, through the same lens.", () => setCamera(!spaceOptions.camera));
 const largeChip = chip("", "Enlarge the 3D view (B)", toggleLarge);
 largeChip.setAttribute("aria-label", "Enlarge the 3D view");
 const hideChip = chip("Hide 3D", "Hide the 3D view; it then costs nothing (V)", toggleHidden);
@@ -59,11 +59,11 @@ export function startSpace(listen) {
     { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: () => lookFrom("behind"), ...SPACE },
     { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: () => lookFrom("above"), ...SPACE },
     { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: () => lookFrom("side"), ...SPACE },
-    { id: "view-camera", words: "3D: look from the camera, over its picture", also: "viewpoint overlay reprojection", run: () => setCamera(true), group: "3D view", when: withPictures },
+    { id: "view-camera", words: "3D: look from the camera, over its image", also: "viewpoint overlay reprojection", run: () => setCamera(true), group: "3D view", when: withImages },
     { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: toggleHidden, ...SPACE },
-    { id: "space-large", words: "Enlarge the 3D view, or give the picture its place back", keys: ["B"], also: "3D big maximize full", run: toggleLarge, ...SPACE },
+    { id: "space-large", words: "Enlarge the 3D view, or give the image its place back", keys: ["B"], also: "3D big maximize full", run: toggleLarge, ...SPACE },
   );
-  Object.assign(window, { cocalibPace: pace, __cocalibSpace: { lookShown, pickable, pictureBox, frameShown, itemAt } });
+  Object.assign(window, { cocalibPace: pace, __cocalibSpace: { lookShown, pickable, imageBox, frameShown, itemAt } });
   on(["playing"], () => Object.assign(pace, { playing: state.playing, every: state.looking ? LOOKING_EVERY : PLAYING_EVERY }));
   for (const type of ["pointerdown", "pointerup", "keydown", "wheel"])
     addEventListener(type, () => (pace.holdUntil = performance.now() + HOLD), { capture: true, passive: true });
@@ -86,7 +86,7 @@ export function startSpace(listen) {
   on(["recording"], () => setTimeout(load, LATEST));
 }
 
-/** Load viser's page, once: it is large, and the first picture comes before it. */
+/** Load viser's page, once: it is large, and the first image comes before it. */
 function load() {
   if (!frame.hasAttribute("src")) frame.src = `viser/${tab}/`;
 }
@@ -132,7 +132,7 @@ function toggleHidden() {
   change({ hidden: !spaceOptions.hidden, large: false });
 }
 
-/** Let the 3D view take the place of the picture, or give it back. */
+/** Let the 3D view take the place of the image, or give it back. */
 function toggleLarge() {
   change({ large: !spaceOptions.large, hidden: false });
 }
@@ -143,7 +143,7 @@ function lookFrom(viewpoint) {
   tell({ type: "viewpoint", viewpoint });
 }
 
-/** Show the page's own picture with the returns in front, or the 3D view. @param {boolean} camera */
+/** Show the page's own image with the returns in front, or the 3D view. @param {boolean} camera */
 function setCamera(camera) {
   if (spaceOptions.camera === camera) return;
   changeSpace({ camera });

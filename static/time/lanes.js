@@ -1,5 +1,5 @@
 /**
- * Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, how much the picture
+ * Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, how much the image
  * changes, and the current frame.
  */
 
@@ -11,14 +11,14 @@ import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
 export const activity = { step_s: 1, returns: [] };
-/** How much the picture changes after some moments, from the server. @type {PictureChanges} */
+/** How much the image changes after some moments, from the server. @type {ImageChanges} */
 export const changes = { seconds: [], grey_levels: [], complete: false };
 /** Changes below this are noise of the camera, at least [grey levels]; so a recording in which nothing moves is not all bright. */
 const MUCH = 12;
-/** @typedef {"placements"|"clicks"|"radar"|"picture"} LaneName */
+/** @typedef {"placements"|"clicks"|"radar"|"image"} LaneName */
 /** @typedef {Record<LaneName, {top: number, bottom: number}>} Boxes */
-const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
-/** A timeline of this height has a higher lane for the picture [CSS px]. */
+const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", image: "Image" };
+/** A timeline of this height has a higher lane for the image [CSS px]. */
 const LARGE = 140;
 
 /** @typedef {CanvasRenderingContext2D} Ink */
@@ -26,18 +26,18 @@ const LARGE = 140;
 
 /** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
 export function laneBoxes(height) {
-  const picture = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
+  const image = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
   const radar = height >= 48 ? Math.min(24, Math.round(height * 0.15)) : 0;
   const placements = Math.max(9, Math.min(20, Math.round(height * 0.15)));
   const bottom = height - lanes.bottom;
-  const radarBottom = bottom - (picture ? picture + lanes.gap : 0);
+  const radarBottom = bottom - (image ? image + lanes.gap : 0);
   const clicksBottom = radarBottom - (radar ? radar + lanes.gap : 0);
   const top = RULER + 2;
   return {
     placements: { top, bottom: top + placements },
     clicks: { top: top + placements + 2, bottom: clicksBottom },
     radar: { top: radarBottom - radar, bottom: radarBottom },
-    picture: { top: bottom - picture, bottom },
+    image: { top: bottom - image, bottom },
   };
 }
 
@@ -56,7 +56,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clip();
   drawRuler(pen, lanes.left, width, height, axis);
   drawRadar(pen, boxes.radar, axis);
-  paintFrame(pen, boxes.picture, axis);
+  paintFrame(pen, boxes.image, axis);
   pen.fillStyle = themeColour("line-strong");
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
@@ -151,7 +151,7 @@ function drawRadar(pen, { top, bottom }, axis) {
   pen.globalAlpha = 1;
 }
 
-/** How much the picture changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+/** How much the image changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
 function paintFrame(pen, { top, bottom }, axis) {
   if (bottom === top) return;
   pen.fillStyle = themeColour("attention");
@@ -233,13 +233,13 @@ function drawCursor(pen, height, x) {
   pen.fill();
 }
 
-/** @typedef {{seconds: number[], grey_levels: number[], complete: boolean}} PictureChanges */
+/** @typedef {{seconds: number[], grey_levels: number[], complete: boolean}} ImageChanges */
 
 /** Until all frames are compared, ask this often [ms]. */
 const EVERY = 3000;
 let timer = 0;
 
-export function startPictureChanges() {
+export function startImageChanges() {
   on(["placements"], () => {
     clearTimeout(timer);
     fetchChanges();
@@ -249,7 +249,7 @@ export function startPictureChanges() {
 async function fetchChanges() {
   if (state.looking || changes.complete) return;
   const ready = state.connected && !state.opening; // the banner says that the server is gone, the status that it is still opening
-  const answer = ready ? await fetch("api/picture_changes.json").catch(() => null) : null;
+  const answer = ready ? await fetch("api/image_changes.json").catch(() => null) : null;
   if (answer?.ok) Object.assign(changes, await answer.json());
   emit("lanes");
   if (!changes.complete && !state.following) timer = window.setTimeout(fetchChanges, EVERY);

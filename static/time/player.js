@@ -89,7 +89,7 @@ function tick() {
   if (!state.playing) return;
   const time = startedFrom + (performance.now() - startedAt) / 1000;
   const due = indexAt(time);
-  if (state.looking) return tickWithoutPictures(due);
+  if (state.looking) return tickWithoutImages(due);
   if (due > asked && coming.length < CREDIT) {
     asked = due;
     const ready = kept.get(due);
@@ -101,7 +101,7 @@ function tick() {
 }
 
 /** The next moment comes once the server has answered for the one before. @param {number} due */
-function tickWithoutPictures(due) {
+function tickWithoutImages(due) {
   if (due > state.cursor && (state.look?.index ?? -1) >= asked) {
     asked = due;
     goTo(due);
@@ -159,7 +159,7 @@ export async function receiveFrame(header, data) {
   if (newer || again || header.index === state.cursor) show(kept.get(header.index) ?? shown);
 }
 
-/** Take a picture that has arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+/** Take an image that has arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
 async function receivePreview(header, data) {
   const preview = await decoded(header, data);
   if (state.shown) return preview.bitmap.close();

@@ -147,17 +147,17 @@ function aboutTime(seconds, event) {
     lines.push(`placement ${number + 1}: ${range_m.toFixed(1)} m away, ${(end_s - start_s).toFixed(1)} s long, ${state.looking ? "" : FATES[fateOf(placement)]}`.replace(/, $/, ""));
   }
   const boxes = laneBoxes(canvas.clientHeight);
-  if (event.offsetY > boxes.radar.bottom) lines.push(...aboutPicture(seconds));
+  if (event.offsetY > boxes.radar.bottom) lines.push(...aboutImage(seconds));
   else if (event.offsetY > boxes.radar.top) lines.push("Height: radar returns per scan");
   return lines;
 }
 
 /** @param {number} seconds */
-function aboutPicture(seconds) {
+function aboutImage(seconds) {
   const next = changes.seconds.findIndex((at) => at > seconds);
   const index = next < 0 ? changes.seconds.length - 1 : next - 1;
-  if (index < 0) return ["Here will be how much the picture changes"];
-  return [`Height: how much the picture changes from one frame to the next. Here the most changed hundredth of it changes by ${changes.grey_levels[index].toFixed(0)} of 255 grey levels.`];
+  if (index < 0) return ["Here will be how much the image changes"];
+  return [`Height: how much the image changes from one frame to the next. Here the most changed hundredth of it changes by ${changes.grey_levels[index].toFixed(0)} of 255 grey levels.`];
 }
 
 /** @param {WheelEvent} event */

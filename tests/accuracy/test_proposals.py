@@ -62,7 +62,7 @@ def test_no_failure_in_a_hundred_leaves_three_percent():
     assert limit_95(2, 2) == "2 of 2, at most 1e+02 % of all at 95 % confidence"
 
 
-def test_the_same_seed_gives_the_same_case_and_pictures():
+def test_the_same_seed_gives_the_same_case_and_images():
     one, other = draw_small(541), draw_small(541)
     assert one.case == other.case
     np.testing.assert_array_equal(one.frames.image(5), other.frames.image(5))

@@ -25,7 +25,7 @@ def test_drawn_corners_give_the_focal_length_and_a_sigma_that_holds():
     assert 0.7 < np.sqrt(np.mean(np.square(scaled))) < 1.3  # 1.00 with a standard error of 0.10
 
 
-def test_rendered_pictures_give_the_focal_length():
+def test_rendered_images_give_the_focal_length():
     series = drawn_series([3, 1], "plumb_bob", FILMS["blur and noise"], views=7)
     result = measured(series)
     assert result.views >= 6
@@ -49,11 +49,11 @@ def test_light_changes_and_boards_drift_only_where_they_should():
 
 
 def test_bad_views_come_after_the_good_ones():
-    pictures, bad = planted([5, 1], views=3)
-    assert sorted(bad) == list(range(3, len(pictures)))
+    images, bad = planted([5, 1], views=3)
+    assert sorted(bad) == list(range(3, len(images)))
     assert list(bad.values()).count("blurred") == 3
     assert {"mirrored", "another board"} < set(bad.values())
-    sharp, blurred = (float(np.abs(np.diff(pictures.picture(i)[..., 0].astype(float))).max()) for i in (0, 3))
+    sharp, blurred = (float(np.abs(np.diff(images.image(i)[..., 0].astype(float))).max()) for i in (0, 3))
     assert blurred < 0.5 * sharp
 
 

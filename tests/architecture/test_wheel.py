@@ -207,15 +207,15 @@ _DRIVER = """transforms:
 """
 
 
-def board_pictures(folder: Path, board: Board, count: int) -> None:
-    """Write pictures of a board into a folder, and as a video beside it."""
+def board_images(folder: Path, board: Board, count: int) -> None:
+    """Write images of a board into a folder, and as a video beside it."""
     folder.mkdir()
     camera = typical_camera("pinhole", width_px=480, height_px=300)
     film = cv2.VideoWriter(str(folder.with_suffix(".mp4")), cv2.VideoWriter.fourcc(*"mp4v"), 5.0, (480, 300))
     for number, pose in enumerate(waved_poses(np.random.default_rng(3), board, camera, count)):
-        picture = render_board(board, camera, pose, seed=number)
-        cv2.imwrite(str(folder / f"left{number:02d}.jpg"), picture)
-        film.write(picture)
+        image = render_board(board, camera, pose, seed=number)
+        cv2.imwrite(str(folder / f"left{number:02d}.jpg"), image)
+        film.write(image)
     film.release()
 
 
@@ -286,9 +286,9 @@ def prepare(folder: Path, run: Callable[[str], object]) -> None:
     kit_pose = "base_link: {sensor_kit_base_link: {x: 1.0, y: 0.0, z: 1.5, roll: 0.0, pitch: 0.0, yaw: 0.0}}\n"
     (folder / "sensors_calibration.yaml").write_text(kit_pose)
     (folder / "driver.yaml").write_text(_DRIVER)
-    board_pictures(folder / "board", Board("checkerboard", 9, 6, 0.025), 9)
+    board_images(folder / "board", Board("checkerboard", 9, 6, 0.025), 9)
     (folder / "board").rename(folder / "real_checkerboards")
-    board_pictures(folder / "pictures", Board("aprilgrid", 6, 6, 0.088, 0.0264, "DICT_APRILTAG_36h11"), 9)
+    board_images(folder / "images", Board("aprilgrid", 6, 6, 0.088, 0.0264, "DICT_APRILTAG_36h11"), 9)
     session = folder / "recordings" / "V017" / "2026-09-21"
     session.mkdir(parents=True)
     for name in ("radar.bag", "camera.bag", "clicks.json"):

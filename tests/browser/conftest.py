@@ -93,7 +93,7 @@ def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
 
 @pytest.fixture
 def radar_only_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
-    """Serve a recording without pictures; nothing is stored, because the session belongs to a recording with pictures."""
+    """Serve a recording without images; nothing is stored, because the session belongs to a recording with images."""
     radar, folder = project_root / "sample_data" / "rooftop" / "radar.bag", tmp_path / "s"
     with (
         open_recording(radar, require=("radar",)) as recording,

@@ -181,9 +181,9 @@ class Driver:
 
     def pixels(self, selector: str) -> np.ndarray:
         """Return a screenshot of an element: (h, w, 3) BGR."""
-        picture = cv2.imdecode(np.frombuffer(self.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)
-        assert picture is not None
-        return np.asarray(picture)
+        image = cv2.imdecode(np.frombuffer(self.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)
+        assert image is not None
+        return np.asarray(image)
 
     def zoom_to(self, u: float, v: float, factor: float) -> None:
         """Turn the wheel over an image point until there are this many screen pixels per image pixel."""

@@ -1,4 +1,4 @@
-"""The page for people who do not see it, or do not use a mouse: axe in every state, words for the picture, Tab and arrows."""
+"""The page for people who do not see it, or do not use a mouse: axe in every state, words for the image, Tab and arrows."""
 
 from collections.abc import Callable
 from typing import Any
@@ -100,7 +100,7 @@ def test_axe_finds_nothing_while_a_recording_is_opened(sample: Recording, open_p
 
 
 @pytest.mark.no_3d_view
-def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
+def test_axe_finds_nothing_without_images_and_keys_reach_each_placement(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look", reduced_motion="reduce")
@@ -112,25 +112,25 @@ def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
     page.page.keyboard.press("Enter")
     page.until("__cocalib.state.look.index === __cocalib.state.placements[2].frame")
     page.until("document.activeElement.dataset.placement === '2'")  # though the table was drawn again
-    page.until("document.getElementById('picture-words').textContent.includes('Placement 3 of')")
+    page.until("document.getElementById('image-words').textContent.includes('Placement 3 of')")
 
 
 @pytest.mark.no_3d_view
-def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -> None:
+def test_the_image_and_its_marks_are_told_in_words(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 5)
-    words = page.page.locator("#picture-words")
+    words = page.page.locator("#image-words")
     expect(words).to_contain_text("Placement 5 of 20")
     expect(words).to_contain_text("5 at column")
     expect(words).to_contain_text("agrees with the others")
     expect(words).to_contain_text("4 marks in other frames")
-    assert page.page.locator("#marks").get_attribute("aria-describedby") == "picture-words"
+    assert page.page.locator("#marks").get_attribute("aria-describedby") == "image-words"
     page.press("n")
     expect(words).to_contain_text("Placement 6 of 20")
     expect(words).to_contain_text("the reflector is expected at column")
     page.press("p", "x")
     expect(words).to_contain_text("5 at column")
     expect(words).to_contain_text("excluded")
-    for name, low, high in (("Width of the picture", 30, 90), ("Height of the 3D view", 20, 60)):
+    for name, low, high in (("Width of the image", 30, 90), ("Height of the 3D view", 20, 60)):
         divider = page.page.get_by_role("separator", name=name)
         before = int(divider.get_attribute("aria-valuenow") or -1)
         assert low < before < high

@@ -88,6 +88,6 @@ def test_the_sheet_needs_no_mouse_and_fits_every_window(
         page.drawn()
         sheet = page.page.locator("#page-evaluate")
         assert sheet.evaluate("(sheet) => sheet.scrollWidth <= sheet.clientWidth"), f"{width} px wide"
-    page.page.locator("#picture-pane").focus()
+    page.page.locator("#image-pane").focus()
     page.press("a")
     assert sheet.is_hidden()

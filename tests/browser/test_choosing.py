@@ -11,7 +11,7 @@ import pytest
 
 from calib_core.synthetic import PRESETS, SimulationOptions, simulate, write_recording
 from tests.browser.driving import Driver
-from tests.picture_recording import grey_frames
+from tests.image_recording import grey_frames
 from tests.served_process import ServedProcess, served_process
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

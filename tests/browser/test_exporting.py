@@ -42,7 +42,7 @@ def solved(open_page: Callable[..., Driver], solved_sample: str) -> Driver:
 
 
 def choose(page: Driver, name: str) -> None:
-    """Choose a format and wait for its text; if it is for rectified pictures only, declare them rectified."""
+    """Choose a format and wait for its text; if it is for rectified images only, declare them rectified."""
     page.page.click(f'{DIALOG} [data-export="{name}"]')
     if name != "clicks" and format_named(name).is_for_rectified:
         page.page.check(RECTIFIED)
@@ -75,7 +75,7 @@ def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibr
     solved.page.click("#export")
     choose(solved, "json")
     reference = read_any_file(saved(solved, tmp_path))
-    for name in ("tf2", "kitti", "matlab", "colmap"):  # text, for rectified pictures, and binary files of each kind
+    for name in ("tf2", "kitti", "matlab", "colmap"):  # text, for rectified images, and binary files of each kind
         choose(solved, name)
         solved.until(f"document.querySelector('{DIALOG} .check.good')")
         path = saved(solved, tmp_path)
@@ -128,7 +128,7 @@ def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(s
     expect(page.locator(f"{DIALOG} .ours tr").last).to_contain_text("qz")
 
 
-def test_the_check_point_is_said_and_marked_on_the_picture_and_the_evidence_is_there_before_saving(
+def test_the_check_point_is_said_and_marked_on_the_image_and_the_evidence_is_there_before_saving(
     solved: Driver,
 ) -> None:
     page = solved.page
@@ -244,7 +244,7 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
-def test_a_format_that_cannot_store_distortion_comes_with_maps_until_pictures_are_declared_rectified_for_good(
+def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_declared_rectified_for_good(
     solved: Driver, tmp_path: Path
 ) -> None:
     page = solved.page
@@ -266,7 +266,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_pictures_ar
         if page.locator(RECTIFIED).evaluate("box => box === document.activeElement"):
             break
     page.keyboard.press("Space")
-    expect(page.locator(f"{DIALOG} .notes")).to_contain_text("Written for rectified pictures")
+    expect(page.locator(f"{DIALOG} .notes")).to_contain_text("Written for rectified images")
     expect(page.locator(RECTIFIED)).to_be_focused()
     assert b"camera_intrinsic" in saved(solved, tmp_path).read_bytes()
     page.click(f'{DIALOG} [data-export="kitti"]')

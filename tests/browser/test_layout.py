@@ -103,18 +103,18 @@ def test_everything_is_in_the_window_or_a_tab_away_at_any_size_whatever_the_name
             "#next-placement",
             "#status-text",
             "#timeline",
-            "#picture-pane",
+            "#image-pane",
             "#zoom",
         )
-        assert out_of_reach(page, *always, ".recording", ".over-picture summary") == [], (width, height)
+        assert out_of_reach(page, *always, ".recording", ".over-image summary") == [], (width, height)
         panel = ("#panel", "#verdict", "#tab-mark", "#tab-deliver", "#page-mark")
         if page.value("document.documentElement.dataset.shape") == "wide":
             assert out_of_reach(page, *panel, "#space", ".over-space summary") == [], (width, height)
         else:
             page.page.click('[data-pane="space"]')
             assert out_of_reach(page, "#space", ".over-space summary", *always) == [], (width, height)
-            page.page.click('[data-pane="picture"]')
-            assert page.value("document.getElementById('picture-pane').offsetWidth") >= width - 4
+            page.page.click('[data-pane="image"]')
+            assert page.value("document.getElementById('image-pane').offsetWidth") >= width - 4
             page.page.click('[data-pane="panel"]')
             assert out_of_reach(page, *panel, *always) == [], (width, height)
         apart = page.value(
@@ -136,17 +136,17 @@ def test_at_200_percent_a_click_hits_its_pixel_and_moves_nothing_else(
     open_page: Callable[..., Driver], server: RunningServer
 ) -> None:
     page = open_page(server.url, viewport={"width": 640, "height": 360}, device_scale_factor=2)
-    before = page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()")
+    before = page.value("document.getElementById('image-pane').getBoundingClientRect().toJSON()")
     page.click(500, 300)
     (click,) = page.view["clicks"]
     assert abs(click["u_px"] - 500) < 2
     assert abs(click["v_px"] - 300) < 2
-    assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
+    assert page.value("document.getElementById('image-pane').getBoundingClientRect().toJSON()") == before
     page.page.click("#menu-button")
     page.page.click('#menu [data-action="options"]')
     page.page.locator(".options input").last.evaluate("(part) => part.focus()")
     assert page.value("[scrollX, scrollY, document.body.scrollTop]") == [0, 0, 0]
-    assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
+    assert page.value("document.getElementById('image-pane').getBoundingClientRect().toJSON()") == before
 
 
 def test_dividers_keep_their_part_in_another_window_and_move_by_keys(page: Driver) -> None:
@@ -162,10 +162,10 @@ def test_dividers_keep_their_part_in_another_window_and_move_by_keys(page: Drive
     page.page.set_viewport_size({"width": 600, "height": 900})
     page.until("document.getElementById('divider-x').getAttribute('aria-orientation') === 'horizontal'")
     page.drawn()
-    high = page.value("document.getElementById('picture-pane').offsetHeight")
+    high = page.value("document.getElementById('image-pane').offsetHeight")
     bar.focus()
     page.page.keyboard.press("ArrowDown")
-    page.until(f"document.getElementById('picture-pane').offsetHeight > {high} + 10")
+    page.until(f"document.getElementById('image-pane').offsetHeight > {high} + 10")
 
 
 FULLY_IN_SIGHT = """(selector) => { const box = document.getElementById("page-mark").getBoundingClientRect();

@@ -1,4 +1,4 @@
-"""The sheet Lens: from a recording that says nothing of its lens to a pose, and the picture without distortion."""
+"""The sheet Lens: from a recording that says nothing of its lens to a pose, and the image without distortion."""
 
 import json
 import threading
@@ -16,7 +16,7 @@ from calib_core.interchange import read_camera_file
 from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, simulate, write_recording
-from cocalib.intrinsics import RecordedPictures
+from cocalib.intrinsics import RecordedImages
 from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace
 from tests.browser.accessibility import violations
@@ -36,7 +36,7 @@ OPTIONS = replace(
     waved_board_s=12.0,
 )
 HELD_FROM = 16
-"""The search waits at this picture until the test has cancelled it."""
+"""The search waits at this image until the test has cancelled it."""
 
 
 @pytest.fixture(scope="module")
@@ -57,21 +57,21 @@ def waved(folder: Path, tmp_path: Path) -> Iterator[tuple[RunningServer, Workspa
 
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """Hold the search at a picture until the event is set."""
+    """Hold the search at an image until the event is set."""
     opened = threading.Event()
 
-    class Held(RecordedPictures):
-        def picture(self, index: int, /) -> np.ndarray:
+    class Held(RecordedImages):
+        def image(self, index: int, /) -> np.ndarray:
             if index >= HELD_FROM:
                 opened.wait(60)
-            return super().picture(index)
+            return super().image(index)
 
-    monkeypatch.setattr("cocalib.web.channel.lens.RecordedPictures", Held)
+    monkeypatch.setattr("cocalib.web.channel.lens.RecordedImages", Held)
     yield opened
     opened.set()
 
 
-def shade_at(page: Driver, u: float, v: float, canvas: str = "picture") -> np.ndarray:
+def shade_at(page: Driver, u: float, v: float, canvas: str = "image") -> np.ndarray:
     """Return what a canvas shows at an image point: red, green, blue."""
     return np.array(
         page.value(
@@ -156,7 +156,7 @@ def test_a_lens_is_calibrated_on_the_page_and_the_clicks_give_a_pose(
     assert violations(page) == []
 
 
-def test_the_rectified_picture_is_that_of_a_pinhole_and_takes_lines_instead_of_marks(
+def test_the_rectified_image_is_that_of_a_pinhole_and_takes_lines_instead_of_marks(
     page: Driver, sample: Recording, workspace: Workspace
 ) -> None:
     page.go_to(40)

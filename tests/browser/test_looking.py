@@ -1,4 +1,4 @@
-"""A recording without pictures: its radar can be looked at, nothing can be clicked, and the page says what was found."""
+"""A recording without images: its radar can be looked at, nothing can be clicked, and the page says what was found."""
 
 import re
 from collections.abc import Callable
@@ -44,7 +44,7 @@ def test_the_view_from_above_explains_what_is_under_the_pointer(page: Driver) ->
     page.until("__cocalib.state.look.index === __cocalib.state.placements[0].frame")
     place = page.page.evaluate(
         """async () => {
-            const { toCanvas } = await import("/picture/birdseye.js");
+            const { toCanvas } = await import("/image/birdseye.js");
             const box = document.getElementById("birdseye").getBoundingClientRect();
             const [x, y] = __cocalib.state.placements[0].position_radar_m;
             const [px, py] = toCanvas(x, y);

@@ -10,21 +10,21 @@ from playwright.sync_api import Browser
 
 from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
-from tests.picture_recording import PictureRecording
+from tests.image_recording import ImageRecording
 from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 DOTS = [(200, 150), (641, 77), (333, 402)]
-"""White pixels on black pictures, one per frame."""
+"""White pixels on black images, one per frame."""
 
 
 @pytest.fixture(scope="module")
 def dots(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
-    pictures = [np.zeros((480, 800, 3), dtype=np.uint8) for _ in DOTS]
-    for picture, (u, v) in zip(pictures, DOTS, strict=True):
-        picture[v, u] = 255
-    recording = PictureRecording(pictures)
+    images = [np.zeros((480, 800, 3), dtype=np.uint8) for _ in DOTS]
+    for image, (u, v) in zip(images, DOTS, strict=True):
+        image[v, u] = 255
+    recording = ImageRecording(images)
     with serving(recording, tmp_path_factory.mktemp("dots") / "s", name="dots", token="test") as (running, _):
         yield running
 
@@ -34,9 +34,9 @@ def drawn_at(page: Driver, u: float, v: float, ratio: float) -> tuple[float, flo
     x, y = page.place_of(u, v)
     left, top = 20 * (int(x) // 20 - 1), 20 * (int(y) // 20 - 1)  # on device pixels at 100, 125 and 200 %
     shot = page.page.screenshot(clip={"x": left, "y": top, "width": 60, "height": 60}, scale="device")
-    picture = cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert picture is not None
-    light = np.where(picture > 120, picture, 0).astype(float)
+    image = cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert image is not None
+    light = np.where(image > 120, image, 0).astype(float)
     rows, columns = np.indices(light.shape) + 0.5
     assert light.sum() > 0
     return left + float((columns * light).sum() / light.sum()) / ratio, top + float(

@@ -1,4 +1,4 @@
-"""While a large recording is being opened: its first picture is shown, nothing can be clicked, and then the page starts."""
+"""While a large recording is being opened: its first image is shown, nothing can be clicked, and then the page starts."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from calib_core.recordings import Recording, first_picture
+from calib_core.recordings import Recording, first_image
 from cocalib.web.messages import Opening
 from cocalib.web.port.link import HandOver, ServerOptions
 from cocalib.web.port.server import RunningServer
@@ -25,9 +25,9 @@ OPENING = Opening("long.bag", "Opening long.bag (5.1 GB): reading its index and 
 
 
 @contextmanager
-def opening(picture_of: Recording) -> Iterator[RunningServer]:
+def opening(image_of: Recording) -> Iterator[RunningServer]:
     """Serve a recording that is still being opened."""
-    with Service(OPTIONS, OPENING, partial(first_picture, picture_of.paths), let_in_after_s=0) as service:
+    with Service(OPTIONS, OPENING, partial(first_image, image_of.paths), let_in_after_s=0) as service:
         server = service._early.result(timeout=40)
         assert server is not None
         yield server
@@ -35,7 +35,7 @@ def opening(picture_of: Recording) -> Iterator[RunningServer]:
 
 @pytest.fixture
 def open_early(open_page: Callable[..., Driver]) -> Callable[[RunningServer], Driver]:
-    """Return a function that opens a page and waits until it shows the first picture."""
+    """Return a function that opens a page and waits until it shows the first image."""
     return lambda server: open_page(server.url, ready="__cocalib.state.preview")
 
 
@@ -43,7 +43,7 @@ def shade_at(page: Driver, u: float, v: float) -> np.ndarray:
     """Return what the canvas shows at an image point: red, green, blue."""
     return np.array(
         page.value(
-            f"(() => {{ const box = document.getElementById('picture'); const [x, y] = __cocalib.toCss({u}, {v});"
+            f"(() => {{ const box = document.getElementById('image'); const [x, y] = __cocalib.toCss({u}, {v});"
             "const ratio = box.width / box.clientWidth;"
             "return [...box.getContext('2d').getImageData(x * ratio, y * ratio, 1, 1).data.slice(0, 3)]; })()"
         ),
@@ -51,15 +51,15 @@ def shade_at(page: Driver, u: float, v: float) -> np.ndarray:
     )
 
 
-def test_the_first_picture_is_there_and_nothing_can_be_done_to_it_until_the_recording_is(
+def test_the_first_image_is_there_and_nothing_can_be_done_to_it_until_the_recording_is(
     sample: Recording, workspace: Workspace, open_early: Callable[[RunningServer], Driver]
 ) -> None:
     with opening(sample) as server:
         page, second = open_early(server), open_early(server)
         page.drawn()
-        picture, (u, v) = sample.image(0), (300, 420)
+        image, (u, v) = sample.image(0), (300, 420)
         for at in ((u, v), (914, 242), (100, 130)):
-            assert shade_at(page, *at) == pytest.approx(picture[at[1], at[0], ::-1], abs=12)
+            assert shade_at(page, *at) == pytest.approx(image[at[1], at[0], ::-1], abs=12)
         assert OPENING.doing in page.text("#status-text")
         assert "Preview" in page.text("#guide")
         assert page.text("#recording-name") == "long.bag"

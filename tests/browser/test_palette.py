@@ -126,13 +126,11 @@ def test_the_help_leads_to_the_documentation_and_its_search(page: Driver) -> Non
     assert complaints == []
 
 
-def test_what_needs_pictures_is_refused_with_the_reason(
-    open_page: Callable[..., Driver], radar_only_server: Any
-) -> None:
+def test_what_needs_images_is_refused_with_the_reason(open_page: Callable[..., Driver], radar_only_server: Any) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look")
     opened(page)
     assert found(page, "export")[0] == "Export the calibration or the clicks"
-    expect(page.page.locator("#palette .entry").first).to_contain_text("There are no pictures in this recording")
+    expect(page.page.locator("#palette .entry").first).to_contain_text("There are no images in this recording")
     page.page.keyboard.press("Escape")
     expect(page.page.locator("dialog[open]")).to_have_count(0)
     page.press("Enter", "e", "Delete", "x", "Control+z")

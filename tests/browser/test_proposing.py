@@ -1,4 +1,4 @@
-"""Confirming instead of clicking: proposals appear while pictures are looked at, and each is decided with a key or a click."""
+"""Confirming instead of clicking: proposals appear while images are looked at, and each is decided with a key or a click."""
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -12,7 +12,7 @@ import pytest
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.proposing import DwellView, FrameSource, PictureCandidate, ViewProgress
+from calib_core.proposing import DwellView, FrameSource, ImageCandidate, ViewProgress
 from calib_core.recordings import Recording
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
@@ -29,8 +29,8 @@ READY = "__cocalib.state.proposals?.progress.stage === 'ready'"
 ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
 
 
-class Pictures:
-    """What replaces looking at the pictures: true places among others, found placement by placement as the test allows."""
+class Images:
+    """What replaces looking at the images: true places among others, found placement by placement as the test allows."""
 
     def __init__(self, truth: Any, held_from: int) -> None:
         self.held_from = held_from
@@ -61,24 +61,24 @@ class Pictures:
         time = next(time for time in self.pixels if placement.start <= time <= placement.end)
         rng = np.random.default_rng(number)
         others = rng.uniform([0, 0], [camera.width_px - 1, camera.height_px - 1], (3, 2))
-        places = [PictureCandidate(at, UNCERTAIN, 5.0) for at in others]
+        places = [ImageCandidate(at, UNCERTAIN, 5.0) for at in others]
         at_px, strength = self.pixels[time] + rng.normal(0.0, 0.3, 2), 3.0 if number % 7 == 6 else 12.0
-        found = PictureCandidate(at_px, 0.4, strength, has_apex=True)
+        found = ImageCandidate(at_px, 0.4, strength, has_apex=True)
         candidates = tuple(sorted([found, *places], key=lambda one: -one.strength))
         frame = np.array([number])
-        picture = np.zeros((0, 0, 3), np.uint8)
-        return DwellView(placement, frame, TimeNs(time), picture, 1.0, candidates, width_px=20.0)
+        image = np.zeros((0, 0, 3), np.uint8)
+        return DwellView(placement, frame, TimeNs(time), image, 1.0, candidates, width_px=20.0)
 
 
 @pytest.fixture
 def held_from() -> int:
-    """Looking at the pictures waits before this placement until the test goes on."""
+    """Looking at the images waits before this placement until the test goes on."""
     return 8
 
 
 @pytest.fixture
-def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Iterator[Pictures]:
-    fake = Pictures(truth, held_from)
+def images(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Iterator[Images]:
+    fake = Images(truth, held_from)
     monkeypatch.setattr("cocalib.proposing.dwell_views", fake)
     monkeypatch.setattr("cocalib.proposing.looks_of", lambda clicks, *_: [object()] if clicks else [])
     monkeypatch.setattr(
@@ -92,10 +92,10 @@ def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Ite
 
 
 @pytest.fixture
-def proposing(pictures: Pictures, workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
+def proposing(images: Images, workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
     running = start(workspace, sample, ServerOptions(port=0, token="test", proposes=True))
     yield running
-    pictures.allowed.set()
+    images.allowed.set()
     running.close()
 
 
@@ -111,15 +111,15 @@ def left(page: Driver) -> int:
     return int(words[words.index("left") - 1])
 
 
-def off_px(page: Driver, pictures: Pictures) -> float:
+def off_px(page: Driver, images: Images) -> float:
     """Return how far the proposal on screen is from the reflector."""
     offer = page.value("__cocalib.shownOffer()")
-    u_px, v_px = pictures.at(offer["row"]["image_time"])
+    u_px, v_px = images.at(offer["row"]["image_time"])
     return float(np.hypot(offer["place"]["pixel_px"][0] - u_px, offer["place"]["pixel_px"][1] - v_px))
 
 
 def test_twenty_placements_take_at_most_25_keys_and_clicks(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
     page = open_page(proposing.url)
     page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.progress.done === 8")
@@ -129,7 +129,7 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
     assert page.value("__cocalib.zoom()") > 1.5 * page.value("document.getElementById('marks').clientWidth / 960")
     page.press("Enter")
     page.until("__cocalib.state.view.clicks.length === 1")
-    pictures.allowed.set()
+    images.allowed.set()
     page.until(READY)
     first = page.view["clicks"][0]
     assert (first["mark"], first["sigma_px"]) == ("snapped", pytest.approx(0.4))
@@ -142,9 +142,9 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
             page.press("n")
             page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
             assert "Not proposed: " in page.text("#guide")
-            page.click(*pictures.at(page.value("__cocalib.stampOf(__cocalib.state.cursor)")))
+            page.click(*images.at(page.value("__cocalib.stampOf(__cocalib.state.cursor)")))
             count += 2
-        elif off_px(page, pictures) < 3.0:
+        elif off_px(page, images) < 3.0:
             assert left(page) <= 20 - done
             offer = page.value("__cocalib.shownOffer().row")
             order += [offer["placement"]] if offer["confidence"] > 0.9 else []
@@ -178,9 +178,9 @@ def enter_does_nothing_else(page: Driver) -> None:
 
 
 def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
-    pictures.allowed.set()
+    images.allowed.set()
     page = open_page(proposing.url)
     page.until(READY)
     page.press("n")
@@ -189,7 +189,7 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
     ):  # near enough for one frame to show the apex
         page.press("n")
     before = left(page)
-    u, v = pictures.at(page.value("__cocalib.shownOffer().row.image_time"))
+    u, v = images.at(page.value("__cocalib.shownOffer().row.image_time"))
     page.click(u + 2, v - 1)
     page.until("__cocalib.state.view.clicks.length === 1")
     assert left(page) == before - 1
@@ -203,9 +203,9 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
 
 
 def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switched_off(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
-    pictures.allowed.set()
+    images.allowed.set()
     page = open_page(proposing.url)
     page.until(READY)
     page.press("n")
@@ -242,7 +242,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
 
 
 def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
     page = open_page(proposing.url)
     user = page.page
@@ -284,7 +284,7 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
     assert page.view["clicks"] == []
     guide(page)
 
-    user.locator(".over-picture summary").click()
+    user.locator(".over-image summary").click()
     page.press("Enter")
     assert len(page.view["clicks"]) == 1
     guide(page)
@@ -297,14 +297,14 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
 
 @pytest.mark.parametrize("held_from", [0])
 def test_the_cross_that_enter_brings_before_any_proposal_gives_way_to_the_first_one(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
     page = open_page(proposing.url)
     page.until("__cocalib.state.placements.length > 0 && __cocalib.state.proposals")
     page.go_to(page.value("__cocalib.state.placements[0].frame"))
     page.press("Enter")
     assert page.value("__cocalib.state.cross") is not None
-    pictures.allowed.set()
+    images.allowed.set()
     page.until("__cocalib.state.cross === null")
     guide(page)
     page.press("Enter")
@@ -312,13 +312,13 @@ def test_the_cross_that_enter_brings_before_any_proposal_gives_way_to_the_first_
 
 
 def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
-    pictures: Pictures,
+    images: Images,
     proposing: RunningServer,
     workspace: Workspace,
     sample: Recording,
     open_page: Callable[..., Driver],
 ) -> None:
-    pictures.allowed.set()
+    images.allowed.set()
     page = open_page(proposing.url)
     page.until(READY)
     page.press("n")

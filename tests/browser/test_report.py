@@ -49,7 +49,7 @@ def test_the_export_panel_downloads_the_report_of_the_answer_on_the_page(
     workspace.import_clicks((project_root / "sample_data/rooftop/clicks.json").read_text(), "clicks.json")
     page.until("__cocalib.state.view.clicks.length > 4 && __cocalib.state.view.has_calibration")
     page.settle()
-    expect(page.page.locator("#export-dialog .text")).to_contain_text("Uncertainty in the picture")
+    expect(page.page.locator("#export-dialog .text")).to_contain_text("Uncertainty in the image")
     with page.page.expect_download() as download:
         page.page.click("#export-dialog .first")
     assert download.value.suggested_filename == "report.html"

@@ -18,7 +18,7 @@ pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this mac
 pytestmark = pytest.mark.browser
 
 GREY = 90
-"""Of every pixel of the recorded pictures."""
+"""Of every pixel of the recorded images."""
 LATEST_S = 120
 
 
@@ -37,8 +37,8 @@ def served(tmp_path: Path) -> Iterator[tuple[str, np.ndarray, tuple[int, int, in
         thread.join()
 
 
-def picture_in(page: Page) -> tuple[np.ndarray, tuple[int, int, int, int]]:
-    """Return what the page shows, red first, and the rectangle of the recorded picture in it (left, top, width, height)."""
+def image_in(page: Page) -> tuple[np.ndarray, tuple[int, int, int, int]]:
+    """Return what the page shows, red first, and the rectangle of the recorded image in it (left, top, width, height)."""
     shown = cv2.imdecode(np.frombuffer(page.screenshot(timeout=LATEST_S * 1000), np.uint8), cv2.IMREAD_COLOR)[
         :, :, ::-1
     ]
@@ -49,7 +49,7 @@ def picture_in(page: Page) -> tuple[np.ndarray, tuple[int, int, int, int]]:
     return shown, tuple(largest[:4])
 
 
-def test_the_viewer_draws_the_picture_with_its_returns_and_asks_nobody_else(
+def test_the_viewer_draws_the_image_with_its_returns_and_asks_nobody_else(
     served: tuple[str, np.ndarray, tuple[int, int, int]], launch: Callable[..., Browser]
 ) -> None:
     link, pixel_px, colour = served
@@ -58,11 +58,11 @@ def test_the_viewer_draws_the_picture_with_its_returns_and_asks_nobody_else(
     page.on("response", lambda response: answered.append(response.url))
     page.goto(f"{link}&renderer=webgl")
     for _ in range(LATEST_S):
-        shown, (left, top, width, height) = picture_in(page)
+        shown, (left, top, width, height) = image_in(page)
         if width * height > 20_000:
             break
         page.wait_for_timeout(500)
-    assert width / height == pytest.approx(320 / 240, rel=0.02), "the picture was not drawn"
+    assert width / height == pytest.approx(320 / 240, rel=0.02), "the image was not drawn"
     near = (np.array([left, top]) + (pixel_px + 0.5) * width / 320).astype(int)
     around = shown[near[1] - 3 : near[1] + 4, near[0] - 3 : near[0] + 4].reshape(-1, 3).astype(int)
     assert np.abs(around - np.array(colour, dtype=int)).max(axis=1).min() <= 40

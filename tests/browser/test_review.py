@@ -132,7 +132,7 @@ def check_contours(page: Driver) -> None:
     assert page.value("document.getElementById('contour-chips').getAttribute('aria-label')") != at_20
     assert "95 %" in page.page.get_attribute("[data-contours='60 m']", "data-hint")
     page.press("5")
-    page.until("document.getElementById('contour-chips').getAttribute('aria-label') === 'Uncertainty in the picture'")
+    page.until("document.getElementById('contour-chips').getAttribute('aria-label') === 'Uncertainty in the image'")
 
 
 def test_two_solutions_have_the_figures_of_the_check_command_and_both_are_drawn(

@@ -1,4 +1,4 @@
-"""The 3D view in a browser: what is in it can be picked and read, and the Camera view equals the picture."""
+"""The 3D view in a browser: what is in it can be picked and read, and the Camera view equals the image."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -122,10 +122,10 @@ def choosing(page: Driver) -> None:
 
 
 def hidden_and_enlarged(page: Driver) -> None:
-    """Hidden it takes no room and gets nothing; enlarged it takes the place of the picture; both are remembered."""
+    """Hidden it takes no room and gets nothing; enlarged it takes the place of the image; both are remembered."""
     box = "JSON.stringify(document.getElementById('%s').getBoundingClientRect())"
     page.press("b")
-    page.until(f"{box % 'space'} === {box % 'picture-pane'}")
+    page.until(f"{box % 'space'} === {box % 'image-pane'}")
     page.press("v")
     page.until("document.getElementById('space').clientHeight < 40")
     before = page.value("__cocalibSpace.lookShown().number")
@@ -139,7 +139,7 @@ def hidden_and_enlarged(page: Driver) -> None:
     assert page.value("document.getElementById('space').clientHeight") > 150
 
 
-def test_the_camera_view_equals_the_picture(solved: Driver, workspace: Workspace, sample: Recording) -> None:
+def test_the_camera_view_equals_the_image(solved: Driver, workspace: Workspace, sample: Recording) -> None:
     outcome = workspace.session.outcome
     assert isinstance(outcome, Calibration)
     solved.go_to(solved.view["clicks"][3]["frame"])
@@ -165,11 +165,11 @@ def test_the_camera_view_equals_the_picture(solved: Driver, workspace: Workspace
     assert len(drawn) == len(expected) > 3
     assert np.abs(drawn - expected).max() < 1.0
     solved.drawn()
-    difference = solved.page.evaluate(PICTURE_DIFFERENCE, [*corner.tolist(), scale])
-    assert difference < 12, "the page's own picture is behind the returns"
+    difference = solved.page.evaluate(IMAGE_DIFFERENCE, [*corner.tolist(), scale])
+    assert difference < 12, "the page's own image is behind the returns"
 
 
-PICTURE_DIFFERENCE = """([left, top, scale]) => {
+IMAGE_DIFFERENCE = """([left, top, scale]) => {
     const layer = document.getElementById("space-layer");
     const { bitmap, width, height } = __cocalib.state.shown;
     const own = new OffscreenCanvas(layer.width, layer.height).getContext("2d");
@@ -181,7 +181,7 @@ PICTURE_DIFFERENCE = """([left, top, scale]) => {
 }"""
 
 
-def test_without_pictures_returns_and_placements_can_be_picked_too(
+def test_without_images_returns_and_placements_can_be_picked_too(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look", viewport=SMALL)
@@ -214,7 +214,7 @@ def scene_without_visers_own_panels(page: Driver) -> None:
         blue, green, red = (page.pixels("#space-view")[..., channel].astype(int) for channel in range(3))
         sky = (blue > 150) & (blue > red + 15)
         if sky.sum() > 200 and (green > red + 60).sum() > 20:
-            break  # the picture on the frustum, and the radar's y axis
+            break  # the image on the frustum, and the radar's y axis
     else:
         pytest.fail("the 3D view stayed empty")
     for panel in (".mantine-Paper-root", ".mantine-Notifications-root"):

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.browser.driving import Driver
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 from tests.served_process import ServedProcess, served_process
 from tests.serving import serving
 
@@ -61,7 +61,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
 @pytest.mark.no_3d_view
 def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:
     hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
-    recording = PictureRecording(grey_pictures(3), image_topic=hostile, radar_topic=f"radar{hostile}")
+    recording = ImageRecording(grey_images(3), image_topic=hostile, radar_topic=f"radar{hostile}")
     with serving(recording, tmp_path / "s", name=f"name{hostile}", token="test") as (running, _):
         page = open_page(running.url)
         page.click(100, 100)
@@ -79,7 +79,7 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
 def test_large_frames_play_at_half_size_and_stand_at_full_size(
     open_page: Callable[..., Driver], tmp_path: Path
 ) -> None:
-    recording = PictureRecording(grey_pictures(30, 2400, 1200))
+    recording = ImageRecording(grey_images(30, 2400, 1200))
     with serving(recording, tmp_path / "s", name="large", token="test") as (running, _):
         page = open_page(running.url)
         assert page.value("__cocalib.state.shown.scale") == 1

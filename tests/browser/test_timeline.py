@@ -12,7 +12,7 @@ from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
-from tests.picture_recording import START, PictureRecording, grey_pictures
+from tests.image_recording import START, ImageRecording, grey_images
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -28,7 +28,7 @@ ALL_S = tuple(
 def islands_page(open_page: Callable[..., Driver], tmp_path: Path) -> Iterator[Driver]:
     """Serve frames at 5 Hz in islands, and say where a reflector stood in each."""
     times_s = np.concatenate([np.arange(start_s, end_s, 0.2) for start_s, end_s in ALL_S])
-    recording = PictureRecording(grey_pictures(len(times_s), 64, 48))
+    recording = ImageRecording(grey_images(len(times_s), 64, 48))
     recording.image_times = START + (times_s * NS_PER_S).astype(np.int64)
     workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="islands")
     server: RunningServer = start(workspace, recording, ServerOptions(port=0, token="test"))

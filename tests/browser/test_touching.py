@@ -15,7 +15,7 @@ TABLET = {"viewport": {"width": 768, "height": 1024}, "has_touch": True, "is_mob
 
 
 class Fingers:
-    """Fingers on the picture, by image points."""
+    """Fingers on the image, by image points."""
 
     def __init__(self, page: Driver) -> None:
         self._page = page
@@ -101,10 +101,10 @@ def test_a_tap_places_a_mark_and_a_long_press_moves_it_under_the_loupe(page: Dri
 STILL_COMPARING = """(() => {
   const ask = window.fetch;
   const told = () => new Response(JSON.stringify({ seconds: [], grey_levels: [], complete: false }));
-  const isAsked = (address) => String(address).includes("picture_changes");
+  const isAsked = (address) => String(address).includes("image_changes");
   window.fetch = (address, ...more) => (isAsked(address) ? Promise.resolve(told()) : ask(address, ...more));
 })()"""
-"""The server never gets to the end of comparing the pictures, so that the page asks again and again."""
+"""The server never gets to the end of comparing the images, so that the page asks again and again."""
 
 
 def test_a_long_press_goes_on_while_the_timeline_is_still_being_filled(

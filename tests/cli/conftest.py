@@ -52,7 +52,7 @@ class Made:
     nan_scans: int = 0
     with_speeds: bool = True
     reflector_m: float = 0.0
-    """Width of the reflector in the pictures; 0 leaves them grey."""
+    """Width of the reflector in the images; 0 leaves them grey."""
 
     @property
     def positions_radar_m(self) -> np.ndarray:
@@ -72,22 +72,22 @@ class Made:
             clicks.append({"id": f"c{index}", "image_time": {"sec": sec, "nanosec": nanosec}, "pixel_px": [u, v]})
         return json.dumps({"schema": "cocalib/clicks-1", "clicks": clicks})
 
-    def picture(self, index: int) -> np.ndarray:
+    def image(self, index: int) -> np.ndarray:
         """Return what the camera sees during a placement: a grey wall, and the reflector's three sheets if there is one."""
         height, width, finer = self.camera.height_px, self.camera.width_px, 8
-        picture = np.full((height * finer, width * finer, 3), 90, np.uint8)
+        image = np.full((height * finer, width * finer, 3), 90, np.uint8)
         position = self.camera_from_radar @ self.positions_radar_m[index]
         apex_px = (self.camera.project(position[None])[0] + 0.5) * finer - 0.5
         radius_px = 0.5 * self.reflector_m * self.camera.matrix_px[0, 0] / position[2] * finer
         corners = apex_px + radius_px * np.array([[np.sin(a), np.cos(a)] for a in np.radians([0, 120, 240])])
         for grey, ends in ((200, (0, 1)), (140, (1, 2)), (40, (2, 0))) if self.reflector_m else ():
             sheet = np.array([apex_px, *corners[list(ends)]]).round().astype(np.int32)
-            cv2.fillPoly(picture, [sheet], (grey, grey, grey))
-        return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+            cv2.fillPoly(image, [sheet], (grey, grey, grey))
+        return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
 
     def messages(self) -> Iterator[RecordedMessage]:
         """Yield the messages in order of time."""
-        jpegs = [cv2.imencode(".jpg", self.picture(index))[1].tobytes() for index in range(self.placements)]
+        jpegs = [cv2.imencode(".jpg", self.image(index))[1].tobytes() for index in range(self.placements)]
         made: list[RecordedMessage] = []
         for k in range(int(self.placements * DWELL_S / FRAME_TIMES_S) + 1):
             time = TimeNs(START + int(k * FRAME_TIMES_S * NS_PER_S))

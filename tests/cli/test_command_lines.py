@@ -149,8 +149,8 @@ _TABLE = [
     (2, "evaluate good.json made.mcap --boxes missing.json", "missing.json"),
     (2, "evaluate good.json made.mcap --min-speed-mps -1", "--min-speed-mps: is -1"),
     (2, "evaluate good.json made.mcap --max-time-gap-s 99", "--max-time-gap-s: is 99"),
-    (2, "evaluate golden.json made.mcap --report o.html", "for pictures of 640 x 480 px, but the recording's"),
-    (2, "evaluate golden.json made.mcap", "for pictures of 640 x 480 px, but the recording's camera has 320 x 240 px"),
+    (2, "evaluate golden.json made.mcap --report o.html", "for images of 640 x 480 px, but the recording's"),
+    (2, "evaluate golden.json made.mcap", "for images of 640 x 480 px, but the recording's camera has 320 x 240 px"),
     (3, "evaluate contradictory.json made.mcap --clicks clicks.json --no-held-out", ""),
     (3, "evaluate bare.txt made.mcap --clicks clicks.json --no-held-out --require usable", ""),
     (0, "evaluate good.json --report o.html", ""),
@@ -224,7 +224,7 @@ _TABLE = [
     (2, "export good.json --to mcap --recording made.mcap --out o.mcap --rectified", "do not apply to --to mcap"),
     (2, "export good.json --to mcap --recording nothing.bag --out o.mcap", "no such file"),
     (2, "export good.json --to mcap --recording made.mcap --out no/folder/o.mcap", "does not exist; create it"),
-    (2, "export good.json --to mcap --recording pictures --out o.mcap", "is no ROS recording"),
+    (2, "export good.json --to mcap --recording images --out o.mcap", "is no ROS recording"),
     (0, "show made.mcap --out o.mp4", "o.mp4: 161 frames, 80.000 s, from 1700000000.000000000 s"),
     (2, "show absent.mcap", ""),
     (2, "show absent.mcap --out o.mp4", "absent.mcap"),
@@ -237,7 +237,7 @@ _TABLE = [
     (
         2,
         "show made.mcap --calibration golden.json --out o.rrd",
-        "its pictures have 320 x 240 px, but the calibration's camera",
+        "its images have 320 x 240 px, but the calibration's camera",
     ),
     (
         2,
@@ -276,7 +276,7 @@ _TABLE = [
     (
         2,
         "intrinsics grey.png made.mcap --board 9x6 --square-mm 25",
-        "2 sources of different kinds (grey.png: a picture, ",
+        "2 sources of different kinds (grey.png: an image, ",
     ),
     (2, "intrinsics broken.mp4 --board 9x6 --square-mm 25", "not a readable video"),
     (2, "intrinsics grey.png", "--board 9x6 and --square-mm 25"),
@@ -287,7 +287,7 @@ _TABLE = [
     (0, "intrinsics camera.yaml --to kalibr", "radtan"),
     (2, "intrinsics camera.yaml --rescale 320x320", "another aspect ratio"),
     (2, "intrinsics camera.yaml --to kalib", "did you mean kalibr?"),
-    (2, "intrinsics clicks.json --board 9x6 --square-mm 25", "give the recording, video or pictures of the board"),
+    (2, "intrinsics clicks.json --board 9x6 --square-mm 25", "give the recording, video or images of the board"),
     (2, "intrinsics camera.yaml --board 9x6 --square-mm 25", "is a file with intrinsics"),
     (0, "session list nothing", "no sessions here or in your user folder"),
     (2, "session list absent", "absent: no such"),
@@ -364,9 +364,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path
         "no-list": "none",
     }.items():
         (path / f"{name}.json").write_text(json.dumps(document | {"clicks": clicks}))
-    for name in ("nothing", "empty.cocalib-session", "pictures"):
+    for name in ("nothing", "empty.cocalib-session", "images"):
         (path / name).mkdir()
-    for name in ("grey.png", "pictures/1700000000.000000.jpg", "pictures/1700000001.000000.jpg"):
+    for name in ("grey.png", "images/1700000000.000000.jpg", "images/1700000001.000000.jpg"):
         cv2.imwrite(str(path / name), np.full((240, 320), 90, np.uint8))
     (path / "broken.mp4").write_bytes(b"not a video")
     (path / "pairs.csv").write_text("x_m,y_m,z_m,u_px,v_px\n1,2,3,4,5\n")

@@ -168,7 +168,7 @@ def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_
     assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err
 
 
-def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(cocalib, golden, tmp_path):
+def test_all_formats_take_the_parent_and_the_rectified_images_where_they_apply(cocalib, golden, tmp_path):
     parent = ["--parent-from-radar", "1.5", "0", "0.25", "0", "0", "0", "1"]
     answer = cocalib("export", golden, "--to", "all", "--out", tmp_path / "a", "--rectified", *parent)
     assert answer.code == 0
@@ -201,7 +201,7 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, 
     cv2.imwrite(str(tmp_path / "image_2" / "00000.png"), np.zeros((240, 320, 3), np.uint8))
     beside = tmp_path / "beside.json"
     answer = cocalib("import", kitti, "--out", beside)
-    assert "image size 320 x 240 px from the pictures beside the file" in answer.err
+    assert "image size 320 x 240 px from the images beside the file" in answer.err
     cameras = [json.loads(path.read_text())["camera"] for path in (back, beside)]
     assert cameras[0] == cameras[1]
     assert (cameras[0]["model"], cameras[0]["width_px"], cameras[0]["height_px"]) == ("pinhole", 320, 240)
@@ -209,7 +209,7 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, 
     np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 
 
-def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictures_with_the_maps_beside_it(
+def test_a_format_without_a_place_for_distortion_is_written_for_rectified_images_with_the_maps_beside_it(
     cocalib, solved, tmp_path
 ):
     out = tmp_path / "calib.txt"
@@ -229,7 +229,7 @@ def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictur
 
     written = cocalib("export", solved, "--to", "kitti", "--rectified", "--out", out)
     assert written.code == 0
-    assert "note: written for rectified pictures" in written.err
+    assert "note: written for rectified images" in written.err
     assert cocalib("check", out, "--against", solved).code == 0
     assert cocalib("export", solved, "--to", "opencv", "--rectified").code == 2
 

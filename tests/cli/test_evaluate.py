@@ -21,7 +21,7 @@ from tests.street import CAMERA, TRUE_POSE, Street, street, turned
 
 
 def written(path: Path, scene: Street, *, late_s: float = 0.0) -> Path:
-    """Write a street as an MCAP recording; all its pictures are the same."""
+    """Write a street as an MCAP recording; all its images are the same."""
     jpeg = cv2.imencode(".jpg", np.full((CAMERA.height_px, CAMERA.width_px, 3), 90, np.uint8))[1].tobytes()
     messages = []
     for frame in scene.boxes:

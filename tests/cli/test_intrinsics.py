@@ -1,4 +1,4 @@
-"""`cocalib intrinsics` on real pictures of a board, and on input that cannot give a calibration."""
+"""`cocalib intrinsics` on real images of a board, and on input that cannot give a calibration."""
 
 import json
 import xml.etree.ElementTree as ElementTree
@@ -14,7 +14,7 @@ import pytest
 
 from calib_core.interchange import read_camera_file
 from cocalib.cli import board_searching as searching
-from cocalib.intrinsics.picture_sources import FilePictures
+from cocalib.intrinsics.image_sources import FileImages
 
 _BOARD = ("--board", "9x6", "--square-mm", "25")
 
@@ -41,7 +41,7 @@ def flat_board(columns: int, rows: int, square_px: int) -> np.ndarray:
 
 
 def write_shifted(folder: Path, board: np.ndarray, count: int) -> None:
-    """Write pictures of a board that is moved sideways only, with a little blur and noise."""
+    """Write images of a board that is moved sideways only, with a little blur and noise."""
     rng = np.random.default_rng(3)
     for index in range(count):
         canvas = np.full((480, 640), 200, dtype=np.uint8)
@@ -51,11 +51,11 @@ def write_shifted(folder: Path, board: np.ndarray, count: int) -> None:
         cv2.imwrite(str(folder / f"flat{index:02d}.png"), np.clip(noisy, 0, 255).astype(np.uint8))
 
 
-def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(cocalib, left, tmp_path, project_root):
+def test_real_images_give_a_lens_as_good_as_opencv_s_with_everything_written(cocalib, left, tmp_path, project_root):
     out, report, rectified = tmp_path / "camera.yaml", tmp_path / "lens.html", tmp_path / "rectified"
     answer = cocalib("intrinsics", *left, *_BOARD, "--json", "--out", out, "--report", report, "--rectified", rectified)
 
-    assert answer.code == 3, answer.err  # these views cover less than half of the picture, and a warning says so
+    assert answer.code == 3, answer.err  # these views cover less than half of the image, and a warning says so
     said = json.loads(answer.out)
     schema = json.loads((project_root / "docs/schemas/intrinsics-1.schema.json").read_text())
     jsonschema.validate(said, schema)
@@ -75,17 +75,17 @@ def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(c
     assert len(list(rectified.glob("*.png"))) == len(left)
 
 
-def test_planted_pictures_are_named_and_no_good_one_is_dropped(cocalib, right, tmp_path):
+def test_planted_images_are_named_and_no_good_one_is_dropped(cocalib, right, tmp_path):
     planted = {f"blurred-{path.name}": cv2.GaussianBlur(cv2.imread(str(path)), (0, 0), 2.5) for path in right[:3]}
     planted["mirrored.png"] = cv2.imread(str(right[4]))[:, ::-1]
     canvas, board = np.full((480, 640), 200, dtype=np.uint8), flat_board(7, 5, 40)
     canvas[40 : 40 + board.shape[0], 60 : 60 + board.shape[1]] = board
     planted["another_board.png"] = cv2.GaussianBlur(canvas, (0, 0), 0.8)
-    for name, picture in planted.items():
-        cv2.imwrite(str(tmp_path / name), picture)
+    for name, image in planted.items():
+        cv2.imwrite(str(tmp_path / name), image)
     answer = cocalib("intrinsics", *right, *(tmp_path / name for name in planted), *_BOARD, "--verbose")
 
-    assert "views          13 used, 5 left out, 18 pictures searched" in answer.out
+    assert "views          13 used, 5 left out, 18 images searched" in answer.out
     said = [line.removeprefix("left out: ") for line in answer.out.splitlines() if line.startswith("left out: ")]
     left_out = dict(line.split(": ", 1) for line in said)
     reasons = {name: "blurred" if "blurred" in name else "mirror" for name in planted} | {"another_board.png": "7 x 5"}
@@ -95,11 +95,11 @@ def test_planted_pictures_are_named_and_no_good_one_is_dropped(cocalib, right, t
 
 def test_a_stopped_search_is_kept_and_resumed_where_it_was(cocalib, left, tmp_path, monkeypatch):
     asked: list[int] = []
-    original = FilePictures.picture
+    original = FileImages.image
 
-    def counted(pictures: FilePictures, index: int, /) -> np.ndarray:
+    def counted(images: FileImages, index: int, /) -> np.ndarray:
         asked.append(index)
-        return original(pictures, index)
+        return original(images, index)
 
     @contextmanager
     def stopping() -> Iterator[Callable[[object], None]]:
@@ -114,26 +114,26 @@ def test_a_stopped_search_is_kept_and_resumed_where_it_was(cocalib, left, tmp_pa
         patched.setattr(searching, "_shown_progress", stopping)
         stopped = cocalib("intrinsics", *left[:6], *_BOARD, "--views", views)
     assert stopped.code == 130
-    assert f"stopped after 4 of 6 pictures, with 4 views of the board; they are kept in {views}" in stopped.err
+    assert f"stopped after 4 of 6 images, with 4 views of the board; they are kept in {views}" in stopped.err
     kept = json.loads(views.read_text())
     assert (kept["schema"], kept["searched"], kept["complete"]) == ("cocalib/board-views-1", [[0, 3]], False)
 
-    monkeypatch.setattr(FilePictures, "picture", counted)
+    monkeypatch.setattr(FileImages, "image", counted)
     resumed = cocalib("intrinsics", *left[:6], *_BOARD, "--views", views, "--model", "plumb_bob")
     assert resumed.code in (0, 3), resumed.err
     assert sorted(asked) == [4, 5]
-    assert "6 pictures searched" in resumed.out
+    assert "6 images searched" in resumed.out
     assert json.loads(views.read_text())["complete"]
 
     other = cocalib("intrinsics", *left[:5], *_BOARD, "--views", views)
     assert other.code == 2
-    assert "views in left01.jpg to left06.jpg (6 pictures), not in left01.jpg to left05.jpg" in other.err
+    assert "views in left01.jpg to left06.jpg (6 images), not in left01.jpg to left05.jpg" in other.err
     smaller = cocalib("intrinsics", *left[:6], "--board", "9x6", "--square-mm", "30", "--views", views)
     assert smaller.code == 2
     assert "with 25 mm, but the board is a checkerboard of 9 x 6 inner corners with 30 mm" in smaller.err
 
 
-def test_pictures_without_a_board_say_so(cocalib, tmp_path):
+def test_images_without_a_board_say_so(cocalib, tmp_path):
     rng = np.random.default_rng(1)
     for index in range(3):
         cv2.imwrite(str(tmp_path / f"{index}.png"), rng.integers(0, 255, (240, 320), dtype=np.uint8))
@@ -164,7 +164,7 @@ def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib, tmp_path):
     assert "turned by 30 to 45°" in answer.err
 
 
-def test_pictures_of_different_sizes_are_not_mixed(cocalib, left, tmp_path):
+def test_images_of_different_sizes_are_not_mixed(cocalib, left, tmp_path):
     for path in left[:2]:
         cv2.imwrite(str(tmp_path / path.name), cv2.resize(cv2.imread(str(path)), (800, 600)))
     answer = cocalib("intrinsics", *left[2:5], *(tmp_path / path.name for path in left[:2]), *_BOARD)
@@ -172,7 +172,7 @@ def test_pictures_of_different_sizes_are_not_mixed(cocalib, left, tmp_path):
     assert "3 of 640 x 480, 2 of 800 x 600 px." in answer.err
 
 
-def test_two_series_of_pictures_in_a_folder_are_told_apart(cocalib, left):
+def test_two_series_of_images_in_a_folder_are_told_apart(cocalib, left):
     answer = cocalib("intrinsics", left[0].parent, *_BOARD)
     assert answer.code == 2
     assert [word for word in ("2 series", "left*.jpg (13)", "right*.jpg (13)") if word not in answer.err] == []
@@ -182,7 +182,7 @@ def test_a_file_with_intrinsics_is_printed_and_converted(cocalib, shared_data, t
     source = shared_data / "real_checkerboards" / "left_intrinsics.yml"
     shown = cocalib("intrinsics", source)
     assert shown.code == 0
-    assert "plumb_bob, pictures of 640 x 480 px" in shown.out
+    assert "plumb_bob, images of 640 x 480 px" in shown.out
     assert "field of view" in shown.out
     for flags in (("--out", tmp_path / "one.json"), ("--rescale", "1280x960", "--out", tmp_path / "twice.json")):
         assert cocalib("intrinsics", source, *flags).code == 0

@@ -92,7 +92,7 @@ def test_a_sheet_draws_each_meaning_over_a_frame(cocalib, ambiguous, made, tmp_p
     drawn = cocalib("import", ambiguous, "--sheet", sheet, "--recording", made(), "--at", "10")
     assert drawn.code == 1
     assert "meanings drawn over a frame of made.mcap" in drawn.err
-    picture = cv2.imread(str(sheet))
-    assert picture.shape[1] % 3 == 0
-    spread = picture.reshape(-1, 3).astype(int)
+    image = cv2.imread(str(sheet))
+    assert image.shape[1] % 3 == 0
+    spread = image.reshape(-1, 3).astype(int)
     assert ((spread.max(axis=1) - spread.min(axis=1)) > 60).sum() > 50  # the frames are grey, the returns are not

@@ -10,7 +10,7 @@ from calib_core.recordings import Recording
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
 from cocalib.cli import run
 from cocalib.workspace import Workspace
-from tests.picture_recording import grey_frames
+from tests.image_recording import grey_frames
 
 
 @pytest.fixture
@@ -41,10 +41,10 @@ def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(served, c
     radar = copied("radar.bag")
     assert run(["open", str(radar), "--no-browser"]) == 0
     assert (
-        capsys.readouterr().out == "radar.bag: no pictures: showing the radar only. "
+        capsys.readouterr().out == "radar.bag: no images: showing the radar only. "
         "To calibrate, give the camera's recording as well.\n\nStopped.\n"
     )
-    assert not served[0].facts.has_pictures
+    assert not served[0].facts.has_images
     assert [path.name for path in radar.parent.iterdir() if path.name != "state"] == ["radar.bag"]
 
 

@@ -67,7 +67,7 @@ _UNSOLVED = {
     *("solve.clicks_out", "solve.out, proposals"),
     *("intrinsics.out, board", "intrinsics.views", "intrinsics.report"),
 }
-"""Nothing comes of grey pictures that could be written; what may be written is told before."""
+"""Nothing comes of grey images that could be written; what may be written is told before."""
 _STREAMED = {"export.out, mcap", "show.out", "show.out, overlay", "show.out, rrd"}
 _EXTRA = {"show.out": "av", "show.out, overlay": "av", "show.out, rrd": "rerun"}
 

@@ -22,7 +22,7 @@ SEEN = Made(reflector_m=0.4, placements=12)
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a recording whose pictures show the reflector."""
+    """Return a recording whose images show the reflector."""
     return write_ros2(tmp_path_factory.mktemp("proposing") / "seen.mcap", SEEN.messages(), container="mcap")
 
 
@@ -45,7 +45,7 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib
     assert head.split()[:3] == ["id", "time", "[s]"]
     assert "nobody has confirmed them yet" in summary
     assert written == f"written to {out}"
-    assert "looking at the pictures: 11 of 11 placements" in answer.err
+    assert "looking at the images: 11 of 11 placements" in answer.err
 
     document = json.loads(out.read_text())
     msgspec.convert(document, ProposalsDocument, dec_hook=from_json)
@@ -174,11 +174,11 @@ def test_the_sample_is_solved_without_a_person(cocalib, project_root, tmp_path):
 
 @dataclass(frozen=True)
 class Reversed(Made):
-    """The pictures of another recording: the placements come in the opposite order."""
+    """The images of another recording: the placements come in the opposite order."""
 
-    def picture(self, index: int) -> np.ndarray:
-        """Return the picture of the placement as far from the end."""
-        return super().picture(self.placements - 1 - index)
+    def image(self, index: int) -> np.ndarray:
+        """Return the image of the placement as far from the end."""
+        return super().image(self.placements - 1 - index)
 
 
 def test_frames_that_show_no_placement_are_said(cocalib, tmp_path):
@@ -190,7 +190,7 @@ def test_frames_that_show_no_placement_are_said(cocalib, tmp_path):
     assert "The camera recorded no frame during any of the 11 placements" in answer.err
 
 
-def test_the_pictures_of_another_recording_are_refused(cocalib, tmp_path):
+def test_the_images_of_another_recording_are_refused(cocalib, tmp_path):
     radar = replace(SEEN, with_images=False, with_camera_info=False)
     camera = Reversed(reflector_m=SEEN.reflector_m, placements=SEEN.placements, with_radar=False)
     paths = [

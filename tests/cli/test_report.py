@@ -1,7 +1,7 @@
 """`cocalib evaluate --report`: calibrations of every kind, a recording, and what cannot be done."""
 
 
-def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names_no_folder(
+def test_on_its_recording_the_report_has_held_out_errors_and_a_image_and_names_no_folder(
     cocalib, solved_sample, bags, sample, tmp_path
 ):
     out = tmp_path / "report.html"

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.corpus_layouts.bags import Bag
-from tests.corpus_layouts.truth import Returns, Truth, picture_times, scene
+from tests.corpus_layouts.truth import Returns, Truth, image_times, scene
 
 
 def odd_big_endian_cloud(folder: Path) -> Truth:
@@ -31,8 +31,8 @@ def odd_big_endian_cloud(folder: Path) -> Truth:
             rows["posX"], rows["posY"], rows["posZ"] = scan.points_m.T
             rows["vRad"], rows["rcs_dBsm"], rows["flags"] = scan.doppler_mps, np.rint(scan.snr_db) - 20, 3
             bag.write_cloud("/radar/detections", "radar", int(time_ns), rows, height=2, row_padding=8)
-        bag.write_camera(picture_times())
-    return Truth((bag.path,), returns.where(filled), picture_times())
+        bag.write_camera(image_times())
+    return Truth((bag.path,), returns.where(filled), image_times())
 
 
 def cloud_of_integers(folder: Path) -> Truth:
@@ -45,8 +45,8 @@ def cloud_of_integers(folder: Path) -> Truth:
             rows["x"], rows["y"], rows["z"] = np.rint(scan.points_m * 100).T
             rows["velocity"], rows["intensity"] = np.rint(scan.doppler_mps * 100), np.rint(scan.snr_db * 10)
             bag.write_cloud("/radar_cloud", "radar", int(scan.times_ns[0]), rows)
-        bag.write_camera(picture_times())
-    return Truth((bag.path,), returns, picture_times(), position_tolerance_m=0.01)
+        bag.write_camera(image_times())
+    return Truth((bag.path,), returns, image_times(), position_tolerance_m=0.01)
 
 
 _DOPPLER = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("doppler", "<f4")])
@@ -72,8 +72,8 @@ def points_beside_a_lidar(folder: Path) -> Truth:
             lidar["x"], lidar["y"], lidar["z"] = rng.normal(0, 15, (3, 900))
             lidar["intensity"], lidar["ring"] = rng.integers(0, 255, 900), rng.integers(0, 16, 900)
             bag.write_cloud("/velodyne_points", "velodyne", time_ns + 3_000_000, lidar)
-        bag.write_camera(picture_times())
-    return Truth((bag.path,), returns, picture_times())
+        bag.write_camera(image_times())
+    return Truth((bag.path,), returns, image_times())
 
 
 def near_and_far(folder: Path) -> Truth:
@@ -84,8 +84,8 @@ def near_and_far(folder: Path) -> Truth:
         for topic, part in (("/radar/far", returns.where(range_m > 12)), ("/radar/near", returns.where(range_m < 20))):
             for scan in part.scans():
                 bag.write_cloud(f"{topic}/points", "radar_front", int(scan.times_ns[0]), _rows(scan))
-        bag.write_camera(picture_times())
-    return Truth((bag.path,), returns, picture_times())
+        bag.write_camera(image_times())
+    return Truth((bag.path,), returns, image_times())
 
 
 def front_and_side(folder: Path) -> Truth:
@@ -101,5 +101,5 @@ def front_and_side(folder: Path) -> Truth:
             bag.write_cloud(
                 "/sensing/radar/corner_left/points", "radar_corner_left", int(scan.times_ns[0]) + 9_000_000, rows
             )
-        bag.write_camera(picture_times())
-    return Truth((bag.path,), front, picture_times())
+        bag.write_camera(image_times())
+    return Truth((bag.path,), front, image_times())

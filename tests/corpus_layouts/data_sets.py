@@ -100,7 +100,7 @@ def _delft(scans: list[Returns]) -> bytes:
 
 
 def kitti_raw_drive(folder: Path) -> Truth:
-    """A KITTI raw drive with a radar's table added: x, y, z and velocity without units, dates of the pictures in a list."""
+    """A KITTI raw drive with a radar's table added: x, y, z and velocity without units, dates of the images in a list."""
     day = folder / "2011_09_26"
     drive = day / "2011_09_26_drive_0001_sync"
     start_ns = 1_317_042_145_964_389_000
@@ -248,7 +248,7 @@ def _write_tables(folder: Path, keyframes: list[tuple[int, Returns, str]]) -> No
 
 
 def tj4dradset(folder: Path) -> Truth:
-    """TJ4DRadSet: numbered frames, `velodyne` is the radar with eight floats a return, pictures of the same numbers."""
+    """TJ4DRadSet: numbered frames, `velodyne` is the radar with eight floats a return, images of the same numbers."""
     training = folder / "TJ4DRadSet_4DRadar" / "training"
     frames = 24
     returns = scene(33, scans=frames)
@@ -269,7 +269,7 @@ def tj4dradset(folder: Path) -> Truth:
 
 
 def radiate(folder: Path) -> Truth:
-    """RADIATE: the radar is pictures of echoes and has no returns, the lidar is tables; times are beside the folders."""
+    """RADIATE: the radar is images of echoes and has no returns, the lidar is tables; times are beside the folders."""
     root = folder / "city_1_0"
     start_s, frames = 1_574_859_771, 12
     rng = np.random.default_rng(5)

@@ -1,4 +1,4 @@
-"""Layouts without ROS: tables, JSON lines, dated pictures and a data port."""
+"""Layouts without ROS: tables, JSON lines, dated images and a data port."""
 
 import json
 import struct
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.recordings import RecordingOptions
-from tests.corpus_layouts.truth import START_NS, Returns, Truth, jpeg, picture_times, scene
+from tests.corpus_layouts.truth import START_NS, Returns, Truth, image_times, jpeg, scene
 
 
 def date_text(time_ns: int, pattern: str) -> str:
@@ -16,8 +16,8 @@ def date_text(time_ns: int, pattern: str) -> str:
     return datetime.fromtimestamp(time_ns // 1000 / 1e6, UTC).strftime(pattern)
 
 
-def write_dated_pictures(folder: Path, times_ns: np.ndarray) -> None:
-    """Write pictures as scripts name them that store the date with microseconds."""
+def write_dated_images(folder: Path, times_ns: np.ndarray) -> None:
+    """Write images as scripts name them that store the date with microseconds."""
     folder.mkdir(parents=True)
     for number, time_ns in enumerate(times_ns.tolist()):
         (folder / date_text(time_ns, "img_%Y-%m-%d_%H-%M-%S-%f.jpg")).write_bytes(jpeg(number))
@@ -36,8 +36,8 @@ def json_lines(folder: Path) -> Truth:
         ]
         lines.append(json.dumps({"ts": int(scan.times_ns[0]) / 1e9, "frame": number, "objects": objects}))
     (folder / "radar.jsonl").write_text("\n".join(lines) + "\n")
-    write_dated_pictures(folder / "cam", picture_times())
-    return Truth((folder,), returns, picture_times(), has_camera=False, time_tolerance_ns=1000)
+    write_dated_images(folder / "cam", image_times())
+    return Truth((folder,), returns, image_times(), has_camera=False, time_tolerance_ns=1000)
 
 
 def german_table(folder: Path) -> Truth:
@@ -56,8 +56,8 @@ def german_table(folder: Path) -> Truth:
         ]
         rows.append(";".join([*(figure.replace(".", ",") for figure in figures), "99,5"]))
     (folder / "radar_export.csv").write_text("\ufeff" + "\r\n".join(rows) + "\r\n", encoding="utf-8")
-    write_dated_pictures(folder / "camera", picture_times())
-    return Truth((folder,), returns, picture_times(), has_camera=False, time_tolerance_ns=1000)
+    write_dated_images(folder / "camera", image_times())
+    return Truth((folder,), returns, image_times(), has_camera=False, time_tolerance_ns=1000)
 
 
 def tab_separated(folder: Path) -> Truth:
@@ -67,8 +67,8 @@ def tab_separated(folder: Path) -> Truth:
     for time_ns, (x, y, z), doppler, _ in _table(returns):
         rows.append(f"{time_ns}\t{x * 1e3:.1f}\t{y * 1e3:.1f}\t{z * 1e3:.1f}\t{doppler:.3f}")
     (folder / "radar.tsv").write_text("\n".join(rows) + "\n")
-    write_dated_pictures(folder / "camera", picture_times())
-    return Truth((folder,), returns, picture_times(), has_camera=False)
+    write_dated_images(folder / "camera", image_times())
+    return Truth((folder,), returns, image_times(), has_camera=False)
 
 
 def _table(returns: Returns) -> list[tuple[int, list[float], float, float]]:
@@ -94,14 +94,14 @@ def lists_and_dates(folder: Path) -> Truth:
         moment = date_text(time_ns, "%Y/%m/%d/%H:%M:%S.") + f"{time_ns // 10_000_000 % 100:02d}"
         rows.append(",".join([moment, str(len(scan.times_ns)), *(f'"{values}"' for values in lists)]))
     (folder / "radar_points.csv").write_text("\n".join(rows) + "\n")
-    write_dated_pictures(folder / "images", picture_times())
+    write_dated_images(folder / "images", image_times())
     stated = RecordingOptions(map=("x=x:m", "y=y:m", "z=z:m", "doppler=velocity:mps"))
-    return Truth((folder,), returns, picture_times(), has_camera=False, stated=stated)
+    return Truth((folder,), returns, image_times(), has_camera=False, stated=stated)
 
 
 def scans_paired_by_number(folder: Path) -> Truth:
-    """One CSV per frame, numbered as the pictures are; the pictures have a list of times."""
-    times_ns = picture_times()
+    """One CSV per frame, numbered as the images are; the images have a list of times."""
+    times_ns = image_times()
     returns = scene(23, scans=len(times_ns))
     (folder / "radar").mkdir()
     (folder / "image").mkdir()
@@ -115,16 +115,16 @@ def scans_paired_by_number(folder: Path) -> Truth:
 
 
 def data_port(folder: Path) -> Truth:
-    """The bytes of a TI AWR1843's data port as a terminal program stored them, beside dated pictures."""
+    """The bytes of a TI AWR1843's data port as a terminal program stored them, beside dated images."""
     start_ns, period_ns = START_NS, 100_000_000
     returns = scene(24, start_ns=start_ns, period_ns=period_ns)
     stream = bytearray(b"\x13\x37" * 5)
     for number, scan in enumerate(returns.scans()):
         stream += _packet(number + 1, int(number * 0.1 * 200e6) + 9_000, scan)
     (folder / "xwr18xx_processed_stream.dat").write_bytes(bytes(stream))
-    write_dated_pictures(folder / "camera", picture_times())
+    write_dated_images(folder / "camera", image_times())
     given = RecordingOptions(radar_start=f"{start_ns / 1e9:.6f},0.1")
-    return Truth((folder,), returns, picture_times(), has_camera=False, time_tolerance_ns=1000, given=given)
+    return Truth((folder,), returns, image_times(), has_camera=False, time_tolerance_ns=1000, given=given)
 
 
 def _packet(frame: int, cycles: int, scan: Returns) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib_core.recordings import RecordingOptions
 from tests.corpus_layouts.bags import Bag, Kind
-from tests.corpus_layouts.truth import Returns, Truth, mirrored, picture_times, polar, scene
+from tests.corpus_layouts.truth import Returns, Truth, image_times, mirrored, polar, scene
 
 Layout = Callable[[Path], Truth]
 
@@ -21,7 +21,7 @@ def _each_scan(
         write = prepare(bag)
         for scan in returns.scans():
             write(bag, scan, int(scan.times_ns[0]))
-        bag.write_camera(picture_times())
+        bag.write_camera(image_times())
     return bag.path
 
 
@@ -85,7 +85,7 @@ def _target_list(
         returns = scene(seed)
         path = _each_scan(folder, kind, returns, prepare)
         assumed_m = None if as_assumed is None else as_assumed(returns.points_m)
-        return Truth((path,), returns, picture_times(), as_assumed_m=assumed_m, **truth)
+        return Truth((path,), returns, image_times(), as_assumed_m=assumed_m, **truth)
 
     layout.__doc__ = about
     return layout
@@ -260,7 +260,7 @@ def nested_twice(folder: Path) -> Truth:
         message = bag.make(name, header=bag.header(time_ns, "radar"), mode=2, sectors=sectors)
         bag.write("/sector_radar/frame", name, message, time_ns)
 
-    return Truth((_each_scan(folder, "db3", returns, prepare),), returns, picture_times())
+    return Truth((_each_scan(folder, "db3", returns, prepare),), returns, image_times())
 
 
 def arrays_side_by_side(folder: Path) -> Truth:
@@ -282,4 +282,4 @@ def arrays_side_by_side(folder: Path) -> Truth:
         message = bag.make(name, header=bag.header(time_ns, "radar"), num_targets=len(scan.times_ns), **arrays)
         bag.write("/radar/frame", name, message, time_ns)
 
-    return Truth((_each_scan(folder, "bag", returns, prepare),), returns, picture_times())
+    return Truth((_each_scan(folder, "bag", returns, prepare),), returns, image_times())

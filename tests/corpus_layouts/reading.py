@@ -66,7 +66,7 @@ def _frame_differences(recording: Recording, truth: Truth) -> list[str]:
     greys = np.array([recording.image(number).mean() for number in range(len(times_ns))])
     expected = np.array([grey_of_frame(number * truth.frame_step) for number in range(len(times_ns))])
     if np.abs(greys - expected).max() > 1.5:
-        found.append(f"{int((np.abs(greys - expected) > 1.5).sum())} frames are other pictures")
+        found.append(f"{int((np.abs(greys - expected) > 1.5).sum())} frames are other images")
     return found
 
 

@@ -1,4 +1,4 @@
-"""What a layout holds: returns, pictures and a camera, made here and known exactly."""
+"""What a layout holds: returns, images and a camera, made here and known exactly."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -120,7 +120,7 @@ def polar(points_m: np.ndarray) -> np.ndarray:
     return np.column_stack([range_m, np.arctan2(points_m[:, 1], points_m[:, 0]), np.arcsin(points_m[:, 2] / range_m)])
 
 
-def picture_times(frames: int = FRAMES, *, start_ns: int = START_NS + 12_000_000, rate_hz: float = 12.0) -> np.ndarray:
+def image_times(frames: int = FRAMES, *, start_ns: int = START_NS + 12_000_000, rate_hz: float = 12.0) -> np.ndarray:
     """Return the frames' times, to whole microseconds."""
     return start_ns + (np.arange(frames) * 1e6 / rate_hz).astype(np.int64) * 1000
 
@@ -130,6 +130,6 @@ def grey_of_frame(number: int) -> int:
 
 
 def jpeg(number: int, suffix: str = ".jpg") -> bytes:
-    """Return the picture of a frame, plain grey, so that it tells its number."""
+    """Return the image of a frame, plain grey, so that it tells its number."""
     pixels = np.full((HEIGHT_PX, WIDTH_PX, 3), grey_of_frame(number), dtype=np.uint8)
     return cv2.imencode(suffix, pixels)[1].tobytes()

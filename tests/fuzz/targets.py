@@ -24,7 +24,7 @@ from calib_core.interchange.hypotheses.ranking import hypotheses_of
 from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
 from calib_core.interchange.own.board_views_json import read_board_views
 from calib_core.measurements import TimeNs
-from calib_core.recordings import Recording, describe, first_picture, inspect_recording
+from calib_core.recordings import Recording, describe, first_image, inspect_recording
 from calib_core.recordings.containers.copying import Losses, copied_file
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import decode
@@ -50,12 +50,12 @@ _LONGEST_SEED = 1 << 17
 
 
 def _jpeg(width_px: int = 24, height_px: int = 16) -> bytes:
-    picture = np.arange(height_px * width_px * 3, dtype=np.uint8).reshape(height_px, width_px, 3)
-    return bytes(cv2.imencode(".jpg", picture)[1])
+    image = np.arange(height_px * width_px * 3, dtype=np.uint8).reshape(height_px, width_px, 3)
+    return bytes(cv2.imencode(".jpg", image)[1])
 
 
 def _read_everything(path: Path) -> None:
-    first_picture([path])
+    first_image([path])
     with inspect_recording(path) as recording:
         recording.radar_scans()
         for index in range(len(recording.image_times)):

@@ -84,7 +84,7 @@ def test_equation_projection_without_distortion_is_k_times_r_p_plus_t():
     np.testing.assert_allclose(projected, [[211.957221, 239.217724]], atol=1e-5)
 
 
-def test_the_published_result_sends_radar_y_to_the_left_of_the_picture():
+def test_the_published_result_sends_radar_y_to_the_left_of_the_image():
     # The paper's text says y right; its data say y left.
     left_in_camera = PUBLISHED_CAMERA_FROM_RADAR.rotation @ [0.0, 1.0, 0.0]
     np.testing.assert_allclose(left_in_camera, [-0.999, 0.023, 0.042], atol=1e-3)

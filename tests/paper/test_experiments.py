@@ -1,4 +1,4 @@
-"""The paper's experiments: recordings with pictures, read from bags and solved, give what the table's scans alone give."""
+"""The paper's experiments: recordings with images, read from bags and solved, give what the table's scans alone give."""
 
 import dataclasses
 import json
@@ -153,7 +153,7 @@ def test_the_documented_page_is_what_the_last_run_measured(project_root):
     assert all(f"\n| {name} | " in documented for name in PAPER)
 
 
-def test_every_picture_says_that_it_is_simulated(project_root):
-    pictures = sorted((project_root / "docs" / "pictures" / "paper").glob("*"))
-    assert [one.name for one in pictures] == [f"fig-{number}.svg" for number in range(2, 7)]
-    assert all(", simulated: " in one.read_text(encoding="utf-8") for one in pictures)
+def test_every_image_says_that_it_is_simulated(project_root):
+    images = sorted((project_root / "docs" / "images" / "paper").glob("*"))
+    assert [one.name for one in images] == [f"fig-{number}.svg" for number in range(2, 7)]
+    assert all(", simulated: " in one.read_text(encoding="utf-8") for one in images)

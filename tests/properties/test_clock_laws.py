@@ -20,7 +20,7 @@ KINDS = (
     "sound", "zero", "constant", "boot", "far-future", "backwards", "set-back", "some-zero", "coarse", "pairs", "slow",
 )  # fmt: skip
 SHARES = {"receive": 0.9, "header": 0.5}
-"""Least share of the other clock's times: stamps may repeat, because a picture that is sent twice is one picture."""
+"""Least share of the other clock's times: stamps may repeat, because an image that is sent twice is one image."""
 
 
 def clock(kind: str, count: int, shift_ns: int) -> np.ndarray:

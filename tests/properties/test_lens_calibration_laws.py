@@ -1,4 +1,4 @@
-"""Laws of calibrating a lens: what must not change it, and how it changes with the picture."""
+"""Laws of calibrating a lens: what must not change it, and how it changes with the image."""
 
 from dataclasses import replace
 
@@ -50,12 +50,12 @@ def test_the_order_of_the_corners_does_not_matter():
     same_lens(calibrated(mixed), LENS.camera.parameters)
 
 
-def test_pictures_of_twice_the_size_have_twice_the_focal_length():
+def test_images_of_twice_the_size_have_twice_the_focal_length():
     larger = tuple(replace(view, size_px=(2560, 1440), pixels_px=2.0 * view.pixels_px + 0.5) for view in VIEWS)
     same_lens(calibrated(larger, size_px=(2560, 1440)), LENS.camera.scaled(2.0).parameters)
 
 
-def test_mirroring_all_pictures_mirrors_the_principal_point():
+def test_mirroring_all_images_mirrors_the_principal_point():
     mirrored = tuple(replace(view, pixels_px=view.pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0]) for view in VIEWS)
     expected = LENS.camera.parameters.copy()
     expected[2] = SIZE_PX[0] - 1.0 - expected[2]

@@ -101,7 +101,7 @@ def test_raw_camera_images_go_by_their_stamps_of_another_year(shared_data):
     ("name", "topic", "words"),
     [
         ("compressed.bag", "/spot/camera/hand_color/image/qoi", "the encoding 'qoi' is not supported"),
-        ("compressedDepth.bag", "/spot/depth/frontleft/image/compressedDepth", "is a depth image, not a picture"),
+        ("compressedDepth.bag", "/spot/depth/frontleft/image/compressedDepth", "is a depth image, not an image"),
     ],
 )
 def test_unsupported_data_is_refused_with_a_clear_error(shared_data, name, topic, words):

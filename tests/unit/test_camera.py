@@ -97,7 +97,7 @@ def test_pixels_move_with_the_intrinsics_as_their_derivative_says(model):
         np.testing.assert_allclose(slopes[row].T, (ahead - behind) / (2.0 * step[row]), rtol=1e-4, atol=1e-3)
 
 
-def test_the_covariance_of_the_intrinsics_is_scaled_with_the_picture():
+def test_the_covariance_of_the_intrinsics_is_scaled_with_the_image():
     camera = typical_camera("plumb_bob")
     known = CameraCovariance(("fx_px", "k1"), np.array([[4.0, 0.1], [0.1, 0.01]]))
     half = camera.with_parameters(camera.parameters, known).scaled(0.5)

@@ -55,7 +55,7 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
     if not found:
         raise InputError(
             f"{folder}: no recording in it: no file that ends in {', '.join(_SUFFIXES)}, and no bag folder; write the manifest "
-            "yourself if the recordings are pictures and tables"
+            "yourself if the recordings are images and tables"
         )
     home = manifest.absolute().parent
     left_out = list(_left_out(folder, found))
@@ -65,7 +65,7 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
 
 
 def _left_out(folder: Path, found: Sequence[ManifestRow]) -> Iterator[str]:
-    """Yield a comment for each folder of pictures, tables or videos beside which there is no recording."""
+    """Yield a comment for each folder of images, tables or videos beside which there is no recording."""
     taken = {path.parent for one in found for path in one.recording} - {folder}
     for where, inside, names in os.walk(folder):
         inside[:] = sorted(name for name in inside if not name.startswith(".") and Path(where, name) not in taken)

@@ -20,7 +20,7 @@ from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.results_folder import ResultsFolder
 
 _LEVELS = 4
-"""As far above a folder of pictures as data sets keep their calibration."""
+"""As far above a folder of images as data sets keep their calibration."""
 _SESSION = ".cocalib-session"
 
 

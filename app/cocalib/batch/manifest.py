@@ -33,7 +33,7 @@ class ManifestRow:
         clicks: file of clicks in this recording; None without.
         auto: place clicks without a person where there are none.
         camera: file of intrinsics; None for the recording's own.
-        rescale_camera: scale these intrinsics to the recorded pictures, if they are the calibrated ones resized.
+        rescale_camera: scale these intrinsics to the recorded images, if they are the calibrated ones resized.
         reflector_m: width of the reflector as the camera sees it [m], for auto.
         boxes: file of boxes to evaluate by; None without.
         topics: which topics, and how they are read.

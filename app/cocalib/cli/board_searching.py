@@ -10,7 +10,7 @@ from calib_core.input_files import read_text
 from calib_core.interchange.own.board_views_json import read_board_views, write_board_views
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
-from cocalib.intrinsics.picture_sources import OpenPictures
+from cocalib.intrinsics.image_sources import OpenImages
 from cocalib.intrinsics.resumed_search import ResumedSearch
 from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import terminal_stream
@@ -19,16 +19,16 @@ _DEFAULT_VIEWS = Path("board-views.json")
 _LINE_EVERY_S = 5.0
 
 
-def search_for(pictures: OpenPictures, board: Board, name: str, views: Path | None) -> ResumedSearch:
+def search_for(images: OpenImages, board: Board, name: str, views: Path | None) -> ResumedSearch:
     """Set up the search; go on from the views in a file, if it is there.
 
     Raises:
-        InputError: the file is for another board or other pictures.
+        InputError: the file is for another board or other images.
     """
-    search = ResumedSearch(pictures, board, name)
+    search = ResumedSearch(images, board, name)
     if views is not None and views.exists():
         search.resume(read_board_views(read_text(views, is_what="a file of board views"), str(views)), file=str(views))
-        print(f"{views}: {search.looked_at} of {len(pictures)} pictures have been searched", file=sys.stderr)
+        print(f"{views}: {search.looked_at} of {len(images)} images have been searched", file=sys.stderr)
     return search
 
 
@@ -53,7 +53,7 @@ def kept_on_interruption(search: ResumedSearch, views: Path | None) -> Iterator[
             raise
         write_whole(path, write_board_views(found))
         print(
-            f"\ncocalib: stopped after {search.looked_at} of {search.source.pictures} pictures, with {len(found.views)} views of "
+            f"\ncocalib: stopped after {search.looked_at} of {search.source.images} images, with {len(found.views)} views of "
             f"the board; they are kept in {path}: give the same command with --views {path} to go on",
             file=sys.stderr,
         )
@@ -88,12 +88,12 @@ class _EveryFewSeconds:
 
 def _line(progress: SearchProgress) -> str:
     """Say how far a search is, and what is missing."""
-    said = f"{progress.searched} of {progress.total} pictures searched, {len(progress.views)} views of the board"
+    said = f"{progress.searched} of {progress.total} images searched, {len(progress.views)} views of the board"
     if progress.left_out:
         said += f", {len(progress.left_out)} left out"
     coverage = progress.coverage
     if coverage is not None and progress.views:
-        said += f", {100.0 * coverage.share:.0f} % of the picture covered"
+        said += f", {100.0 * coverage.share:.0f} % of the image covered"
         if coverage.missing:
             said += f"; missing: {coverage.missing[0]}"
     return said

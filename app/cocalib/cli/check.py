@@ -37,7 +37,7 @@ class Check:
     max_cm: Annotated[float | None, called("CM")] = None
     """Accept camera positions up to this distance apart."""
     max_px: Annotated[float | None, called("PX")] = None
-    """Accept points up to this far apart in the picture: rms at each of 5, 20 and 60 m, and by the lens alone."""
+    """Accept points up to this far apart in the image: rms at each of 5, 20 and 60 m, and by the lens alone."""
     max_sigma: Annotated[float | None, called("SIGMA")] = None
     """Accept differences up to this many standard deviations (p = 5 % is 1.96)."""
     same_sensors: Switch = False

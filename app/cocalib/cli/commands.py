@@ -71,7 +71,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "intrinsics",
             "cocalib.cli.intrinsics:Intrinsics",
-            "Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.",
+            "Calibrate a camera's lens from images of a board, or convert a file with intrinsics.",
             (
                 "drive.mcap --board 9x6 --square-mm 25 --out camera.yaml",
                 "camera.yaml --to mrcal --out camera.cameramodel",

@@ -45,14 +45,14 @@ class Export:
     """Pose of the radar in the parent frame of autoware (kit), driveworks (rig) or nuscenes (ego): metres, quaternion, w last."""
 
     rectified: Switch = False
-    """Your pictures are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
+    """Your images are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
     for_: Annotated[Literal["raw"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
     """raw: the pose for radar data as reported, for users who cannot take out what the radar gets wrong."""
     trees: Trees = field(default_factory=TreeFlags)
     frames: Frames = field(default_factory=FrameFlags)
 
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
-    """For `--to mcap`: write this ROS recording again with the calibration in it, so that viewers draw returns on pictures."""
+    """For `--to mcap`: write this ROS recording again with the calibration in it, so that viewers draw returns on images."""
     topics: Topics = field(default_factory=TopicFlags)
     output: Output = field(default_factory=OutputFlags)
 

@@ -36,7 +36,7 @@ class MeaningFlags:
     as_: Annotated[str | None, tyro.conf.arg(name="as", metavar="MEANING", help_behavior_hint="")] = None
     """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
     sheet: OutFile = None
-    """Draw each meaning over a frame of --recording and write the picture here (PNG)."""
+    """Draw each meaning over a frame of --recording and write the image here (PNG)."""
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
     """A recording of these sensors, one file or several: --sheet draws over one of its frames."""
     at: Annotated[float | None, called("SECONDS")] = None
@@ -132,7 +132,7 @@ class MeaningFlags:
 
 
 def _camera_in(file: "UnstatedFile") -> "Camera | None":
-    """Return the camera in the file, if the size of its pictures is stated.
+    """Return the camera in the file, if the size of its images is stated.
 
     Raises:
         InputError: a parameter is invalid.
@@ -214,7 +214,7 @@ class Import:
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
-    """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
+    """Size of the images [px], if the file has a camera matrix but no size; by default that of the images beside it."""
     pairs: File = None
     """Pairs that prove what the file means: a pairs-1 file, or a calibration-1 file with pairs."""
     against: File = None
@@ -283,21 +283,21 @@ _RESTS_ON = {
 
 
 def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None) -> "Camera | None":
-    """Return the camera of a file that states its matrix but no size, if the size is given or pictures are beside it.
+    """Return the camera of a file that states its matrix but no size, if the size is given or images are beside it.
 
     Raises:
         InputError: the matrix is not a camera's.
     """
-    from calib_core.recordings import size_of_pictures_beside
+    from calib_core.recordings import size_of_images_beside
     from cocalib.opening.opened import camera_of
 
     if found.matrix_px is None:
         if image_size_px is not None:
             raise InputError(f"{path}: --image-size is for files with a camera matrix and no size; remove it")
         return None
-    size_px = image_size_px or size_of_pictures_beside(path)
+    size_px = image_size_px or size_of_images_beside(path)
     if size_px is None:
         return None
     if image_size_px is None:
-        print(f"note: image size {size_px[0]} x {size_px[1]} px from the pictures beside the file", file=sys.stderr)
+        print(f"note: image size {size_px[0]} x {size_px[1]} px from the images beside the file", file=sys.stderr)
     return camera_of(found, path, size_px)

@@ -19,13 +19,13 @@ class Info:
     """Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings."""
 
     recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of images, radar CSV, videos; several are read as one recording."""
     json: Switch = False
     """Print JSON instead of text."""
     verify: Switch = False
     """Read every message and check every checksum; exit code 1 if anything is damaged, lost or undecodable."""
-    decode_pictures: Switch = False
-    """With --verify, decode every picture; otherwise only its first and last bytes are looked at."""
+    decode_images: Switch = False
+    """With --verify, decode every image; otherwise only its first and last bytes are looked at."""
     write: Switch = False
     """Write recording.toml beside the recording: its topics, clock and columns, which every command reads from then on."""
     topics: Topics = field(default_factory=TopicFlags)
@@ -75,7 +75,7 @@ class Info:
             self.topics.open(self.recording, ()) as recording,
             progress_bar("reading everything") as progress,
         ):
-            found = verify_recording(recording, decode_pictures=self.decode_pictures, progress=progress)
+            found = verify_recording(recording, decode_images=self.decode_images, progress=progress)
         print(
             msgspec.json.format(msgspec.json.encode(found), indent=2).decode()
             if self.json

@@ -1,4 +1,4 @@
-"""`cocalib intrinsics`: calibrate a lens from pictures of a board, or convert a file with intrinsics."""
+"""`cocalib intrinsics`: calibrate a lens from images of a board, or convert a file with intrinsics."""
 
 import re
 import sys
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from calib_core.intrinsics import Board, BoardSearch, CalibratedLens
     from calib_core.intrinsics.coverage import Coverage
     from calib_core.results import DataWarning
-    from cocalib.intrinsics import OpenPictures
+    from cocalib.intrinsics import OpenImages
     from cocalib.intrinsics.resumed_search import ResumedSearch
 
 
 @dataclass(frozen=True, slots=True)
 class BoardFlags:
-    """Which calibration board is in the pictures."""
+    """Which calibration board is in the images."""
 
     board: Annotated[str | None, called("COLUMNSxROWS")] = None
     """Size of the board: inner corners of a checkerboard (9x6 for 10 x 7 squares), squares of a ChArUco board, tags of a grid."""
@@ -58,7 +58,7 @@ class BoardFlags:
                 if value is None
             )
             raise InputError(
-                f"which board is in the pictures is not said: give {missing} "
+                f"which board is in the images is not said: give {missing} "
                 "(a checkerboard of 10 x 7 squares has 9x6 inner corners)"
             )
         return board_of_size(
@@ -76,10 +76,10 @@ BoardUsed: TypeAlias = Annotated[BoardFlags, tyro.conf.arg(name="")]
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics."""
+    """Calibrate a camera's lens from images of a board, or convert a file with intrinsics."""
 
     source: Annotated[tuple[Path, ...], tyro.conf.Positional, called("SOURCE...")] = ()
-    """A recording, a video, a folder of pictures or picture files of one camera; or a file with intrinsics."""
+    """A recording, a video, a folder of images or image files of one camera; or a file with intrinsics."""
     image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
     board: BoardUsed = field(default_factory=BoardFlags)
     out: OutFile = None
@@ -87,17 +87,17 @@ class Intrinsics:
     to: Annotated[str | None, called("FORMAT")] = None
     """Format of the intrinsics: ros, kalibr, opencv, opencv-xml, opencv-json, mrcal, colmap, kitti, matlab, json."""
     rescale: Annotated[str | None, called("WIDTHxHEIGHT")] = None
-    """With a file with intrinsics: convert them to the same pictures, resized to this size [px]."""
+    """With a file with intrinsics: convert them to the same images, resized to this size [px]."""
     views: OutFile = None
     """File of the views found (cocalib/board-views-1 JSON): read if it is there, to resume a search; written at the end."""
     report: OutFile = None
     """Write a report on the lens to this file (.html)."""
     rectified: OutFolder = None
-    """Write the used pictures without the distortion into this folder, with straight lines to judge it by."""
+    """Write the used images without the distortion into this folder, with straight lines to judge it by."""
     json: Switch = False
     """Print everything as JSON (cocalib/intrinsics-1)."""
     verbose: Switch = False
-    """List every view and every picture that was left out."""
+    """List every view and every image that was left out."""
     model: Annotated[LensChoice, MORE] = "auto"
     """Lens model; auto takes the simplest that predicts views it has not seen as well as any."""
     output: Output = field(default_factory=OutputFlags)
@@ -106,7 +106,7 @@ class Intrinsics:
         """Calibrate or convert; return the exit code."""
         if not self.source:
             raise InputError(
-                "SOURCE is missing: give a recording, a video, a folder of pictures or picture files; "
+                "SOURCE is missing: give a recording, a video, a folder of images or image files; "
                 "see cocalib intrinsics --help"
             )
         if self._is_camera_file():
@@ -127,7 +127,7 @@ class Intrinsics:
         if any(unused) or self.json or self.board != BoardFlags() or self.image_topic:
             raise InputError(
                 f"{self.source[0]} is a file with intrinsics, which is printed or converted (--to, --out), if any; for the other "
-                "options, give the recording, video or pictures of the board"
+                "options, give the recording, video or images of the board"
             )
         require_format(self.to)
         size_px = size_of(self.rescale) if self.rescale is not None else None
@@ -154,11 +154,11 @@ class Intrinsics:
         from calib_core.measurements import Unsolvable
         from cocalib.cli.board_searching import kept_on_interruption, search_for, searched
         from cocalib.cli.lens_output import left_out_lines
-        from cocalib.intrinsics import open_pictures
+        from cocalib.intrinsics import open_images
 
         board = self.board.required()
-        with open_pictures(self.source, RecordingOptions(image_topic=self.image_topic)) as pictures:
-            search = search_for(pictures, board, _source_name(self.source), self.views)
+        with open_images(self.source, RecordingOptions(image_topic=self.image_topic)) as images:
+            search = search_for(images, board, _source_name(self.source), self.views)
             with kept_on_interruption(search, self.views):
                 found = searched(search, self.views)
                 lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.model)
@@ -168,11 +168,11 @@ class Intrinsics:
                     lines = () if isinstance(found, Unsolvable) else left_out_lines(found.left_out)
                     print("".join(f"  {line}\n" for line in lines), end="", file=sys.stderr)
                     return code
-                lens = replace(lens, warnings=(*lens.warnings, *_about_series(pictures)))
-                return self._deliver(lens, found, search, pictures)
+                lens = replace(lens, warnings=(*lens.warnings, *_about_series(images)))
+                return self._deliver(lens, found, search, images)
 
     def _deliver(
-        self, lens: "CalibratedLens", found: "BoardSearch", search: "ResumedSearch", pictures: "OpenPictures"
+        self, lens: "CalibratedLens", found: "BoardSearch", search: "ResumedSearch", images: "OpenImages"
     ) -> int:
         """Write and print the lens; return the exit code."""
         from calib_core.interchange.own.intrinsics_json import write_intrinsics
@@ -198,18 +198,18 @@ class Intrinsics:
             print(f"use it: cocalib open RECORDING --camera {self.out}", file=told)
         elif not self.json:
             print("use it: write it with --out camera.yaml, then cocalib open RECORDING --camera camera.yaml")
-        self._write_pictures(lens, found, coverage, pictures, search)
+        self._write_images(lens, found, coverage, images, search)
         return 3 if any(warning.code in DOUBTFUL for warning in lens.warnings) else 0
 
-    def _write_pictures(
+    def _write_images(
         self,
         lens: "CalibratedLens",
         found: "BoardSearch",
         coverage: "Coverage",
-        pictures: "OpenPictures",
+        images: "OpenImages",
         search: "ResumedSearch",
     ) -> None:
-        """Write the report and the rectified pictures, if they are asked for."""
+        """Write the report and the rectified images, if they are asked for."""
         told = sys.stderr if self.json else sys.stdout
         if self.report is not None:
             from cocalib.report.lens_page import lens_report_html
@@ -217,14 +217,14 @@ class Intrinsics:
             write_whole(self.report, lens_report_html(lens, search.source, coverage, searched=found.searched))
             print(f"report written to {self.report}", file=told)
         if self.rectified is not None:
-            from cocalib.intrinsics.rectified_pictures import rectified_pictures
+            from cocalib.intrinsics.rectified_images import rectified_images
 
             self.rectified.mkdir(parents=True, exist_ok=True)
             count = 0
-            for name, content in rectified_pictures(pictures, lens):
+            for name, content in rectified_images(images, lens):
                 count += 1
                 write_whole(self.rectified / f"{count:03d}_{_file_name(name)}.png", content)
-            print(f"{count} rectified pictures written to {self.rectified}", file=told)
+            print(f"{count} rectified images written to {self.rectified}", file=told)
 
 
 def _source_name(paths: tuple[Path, ...]) -> str:
@@ -234,15 +234,15 @@ def _source_name(paths: tuple[Path, ...]) -> str:
 
 
 def _file_name(name: str) -> str:
-    """Return a picture's name as part of a file's name."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", Path(name).stem).strip("_") or "picture"
+    """Return an image's name as part of a file's name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", Path(name).stem).strip("_") or "image"
 
 
-def _about_series(pictures: "OpenPictures") -> "Iterator[DataWarning]":
+def _about_series(images: "OpenImages") -> "Iterator[DataWarning]":
     """Warn if the files given are perhaps of several cameras."""
     from calib_core.results import DataWarning
-    from cocalib.intrinsics.picture_sources import FilePictures, series_of
+    from cocalib.intrinsics.image_sources import FileImages, series_of
 
-    series = series_of(pictures.paths) if isinstance(pictures, FilePictures) else {}
+    series = series_of(images.paths) if isinstance(images, FileImages) else {}
     if len(series) > 1:
         yield DataWarning("several-series", {"series": {name: len(found) for name, found in series.items()}})

@@ -11,7 +11,7 @@ from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     BoardSearch,
     CalibratedLens,
-    LeftOutPicture,
+    LeftOutImage,
     projection_uncertainty,
     residual_field,
     split_difference,
@@ -43,7 +43,7 @@ _MOST_LEFT_OUT = 12
 
 def _camera_lines(camera: Camera) -> Iterator[str]:
     """Yield the parameters of a camera, one a line, with their standard deviations if they are known."""
-    yield f"model          {camera.model}, pictures of {camera.width_px} x {camera.height_px} px"
+    yield f"model          {camera.model}, images of {camera.width_px} x {camera.height_px} px"
     known = camera.covariance
     for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True):
         unit = " px" if name.endswith("_px") else ""
@@ -64,7 +64,7 @@ def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *,
     yield from _camera_lines(lens.camera)
     yield f"choice         {sentence(lens.choice)}"
     yield f"RMS            {lens.rms_px:.3f} px in the used views, {lens.held_out_rms_px:.3f} px in views left out in turn"
-    yield f"views          {len(lens.views)} used, {len(lens.left_out)} left out, {search.searched} pictures searched"
+    yield f"views          {len(lens.views)} used, {len(lens.left_out)} left out, {search.searched} images searched"
     yield from _uncertainty_lines(lens)
     yield from _coverage_lines(coverage)
     if verbose:
@@ -73,11 +73,11 @@ def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *,
     yield from (f"warning: {in_sentences(one)} [{one.code}]" for one in lens.warnings)
 
 
-def left_out_lines(left_out: Sequence[LeftOutPicture], *, most: int = _MOST_LEFT_OUT) -> Iterator[str]:
-    """Yield the pictures that were not used, with the reasons; beyond so many lines, how many there are."""
+def left_out_lines(left_out: Sequence[LeftOutImage], *, most: int = _MOST_LEFT_OUT) -> Iterator[str]:
+    """Yield the images that were not used, with the reasons; beyond so many lines, how many there are."""
     whole = most >= len(left_out)
-    named = [picture for picture in left_out if whole or not picture.spare]
-    yield from (f"left out: {picture.name}: {picture.reason}" for picture in named[:most])
+    named = [image for image in left_out if whole or not image.spare]
+    yield from (f"left out: {image.name}: {image.reason}" for image in named[:most])
     if len(named) > most:
         yield f"left out: {len(named) - most} more (--verbose names them)"
     if len(named) < len(left_out):
@@ -88,14 +88,14 @@ def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
     sigmas = projection_uncertainty(lens).sigma_px
     middle = sigmas[sigmas.shape[0] // 2, sigmas.shape[1] // 2]
     corners = sigmas[[0, 0, -1, -1], [0, -1, 0, -1]].max()
-    yield f"projection     known to {plain(middle, 2)} px in the middle of the picture, {plain(corners, 2)} px in a corner"
+    yield f"projection     known to {plain(middle, 2)} px in the middle of the image, {plain(corners, 2)} px in a corner"
     yield f"               {MODEL_ERRORS_UNSEEN}"
     yield f"cross-check    {halves_text(split_difference(lens))}"
     yield f"residuals      {residuals_text(residual_field(lens))}"
 
 
 def _coverage_lines(coverage: Coverage) -> Iterator[str]:
-    parts = [f"{100.0 * coverage.share:.0f} % of the picture"]
+    parts = [f"{100.0 * coverage.share:.0f} % of the image"]
     parts += [f"{name} {count}" for name, count in (*coverage.tilts.items(), *coverage.distances.items())]
     yield f"coverage       {', '.join(parts)}"
     yield from (f"film next      {sentence(one)}" for one in coverage.missing)
@@ -118,7 +118,7 @@ def convert_camera(path: Path, *, to: str | None, out: Path | None, size_px: tup
         path: of the file; "file.yml#cam1" selects one of its cameras.
         to: format to write.
         out: file to write.
-        size_px: width and height of pictures to which the camera is rescaled; None to keep its own.
+        size_px: width and height of images to which the camera is rescaled; None to keep its own.
     """
     from calib_core.interchange import CameraFile
 
@@ -174,7 +174,7 @@ def size_of(text: str) -> tuple[int, int]:
     """
     match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
     if not match or not (int(match[1]) and int(match[2])):
-        raise InputError(f"--rescale {text}: give width and height of the pictures, such as 1280x720")
+        raise InputError(f"--rescale {text}: give width and height of the images, such as 1280x720")
     return int(match[1]), int(match[2])
 
 

@@ -25,7 +25,7 @@ class Open:
     NAMED = CalibrationOptions
 
     recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording.
+    """Bags (.bag, .mcap, .db3, folders), or folders of images, radar CSV, videos; several are read as one recording.
     Without one, it is chosen in the page."""
     camera: GivenCamera = field(default_factory=CameraFlags)
     calibration: File = None

@@ -171,14 +171,14 @@ def shown_progress() -> "Iterator[Callable[[ViewProgress | str], None]]":
             if isinstance(progress, str):
                 bar.update(task, description=progress)
             else:
-                bar.update(task, description="looking at the pictures", completed=progress.done, total=progress.count)
+                bar.update(task, description="looking at the images", completed=progress.done, total=progress.count)
 
         yield show
 
 
 def _tell_step(progress: "ViewProgress | str") -> None:
-    """Print the beginning of each step; of the pictures only the first and the last dwell."""
+    """Print the beginning of each step; of the images only the first and the last dwell."""
     if isinstance(progress, str):
         print(f"{progress} ...", file=sys.stderr, flush=True)
     elif progress.done in (1, progress.count):
-        print(f"looking at the pictures: {progress.done} of {progress.count} placements", file=sys.stderr, flush=True)
+        print(f"looking at the images: {progress.done} of {progress.count} placements", file=sys.stderr, flush=True)

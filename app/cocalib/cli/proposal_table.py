@@ -66,7 +66,7 @@ def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
 
 
 def _summary(proposals: Proposals, confirmed: Sequence[str]) -> str:
-    """Say how many there are, and how far pictures and radar agree."""
+    """Say how many there are, and how far images and radar agree."""
     count = len(proposals.ranked)
     said = f"{count} {'proposal' if count == 1 else 'proposals'}, nobody has confirmed {'it' if count == 1 else 'them'} yet"
     if not count:
@@ -75,7 +75,7 @@ def _summary(proposals: Proposals, confirmed: Sequence[str]) -> str:
         said += f"; {len(confirmed)} {'click was' if len(confirmed) == 1 else 'clicks were'} given as confirmed"
     if proposals.camera_from_radar is not None:
         agreement, rival = (100.0 * share for share in (proposals.agreement, proposals.rival_agreement))
-        said += f"; pictures and radar agree on one mounting by {agreement:.0f} %, on another by {rival:.0f} %"
+        said += f"; images and radar agree on one mounting by {agreement:.0f} %, on another by {rival:.0f} %"
     return said
 
 

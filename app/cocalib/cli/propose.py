@@ -1,4 +1,4 @@
-"""`cocalib solve --propose`: where the reflector probably stands in the pictures, for a person or a script to confirm."""
+"""`cocalib solve --propose`: where the reflector probably stands in the images, for a person or a script to confirm."""
 
 import sys
 from dataclasses import dataclass

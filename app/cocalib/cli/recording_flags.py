@@ -74,7 +74,7 @@ class RecordedFlags:
     """A recording, and how it is read."""
 
     recording: Recordings = ()
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of images, radar CSV, videos; several are read as one recording."""
     topics: Topics = field(default_factory=TopicFlags)
 
     def open(self, require: "Sequence[Need]" = ("radar", "image")) -> "Recording":
@@ -99,7 +99,7 @@ class CameraFlags:
     camera: File = None
     """Intrinsics to use if there are none, or instead of the recording's own: any format that `cocalib intrinsics` writes."""
     rescale_camera: MoreSwitch = False
-    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    """With --camera: scale its intrinsics to the recorded images, if these are the calibrated ones resized."""
 
     def read(self) -> "CameraFile | None":
         """Read the file, if one is given.

@@ -28,7 +28,7 @@ class ServingFlags:
     no_browser: Switch = False
     """Print the link, do not open a browser."""
     no_proposals: Switch = False
-    """Do not look in the pictures for where the reflector stood; the page can still ask for it."""
+    """Do not look in the images for where the reflector stood; the page can still ask for it."""
     on_problem: Annotated[Literal["auto", "ask", "exit"], called()] = "auto"
     """What to do if the recording cannot be opened: ask in the page, or exit with code 2; auto asks, but exits with
     --no-browser if the output is no terminal, as in scripts."""

@@ -23,7 +23,7 @@ class Simulate:
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER"), OUTPUT_FOLDER]
     """Output folder; created if missing, must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
-    """Files to write: ros1 (radar.bag and camera.bag), mcap, db3; without ROS: dated pictures, and the radar as csv."""
+    """Files to write: ros1 (radar.bag and camera.bag), mcap, db3; without ROS: dated images, and the radar as csv."""
     preset: PresetName = "default"
     """Set of options that makes the recording unkind in one way or in many; --options and --set change single ones."""
     options: File = None
@@ -34,11 +34,11 @@ class Simulate:
     def run(self) -> int:
         """Write the recording; return the exit code."""
         from calib_core.synthetic import simulate, write_recording
-        from calib_core.synthetic.files import pictures_size_bytes
+        from calib_core.synthetic.files import images_size_bytes
 
         recording = simulate(with_named(PRESETS[self.preset], self.set, self.options))
         with whole_folder(self.out) as part:
-            require_room(self.out, len(self.containers) * pictures_size_bytes(recording))
+            require_room(self.out, len(self.containers) * images_size_bytes(recording))
             with progress_bar("rendering frames") as progress:
                 paths = write_recording(recording, part, containers=self.containers, progress=progress)
         print("\n".join(str(self.out / path.relative_to(part)) for path in paths))

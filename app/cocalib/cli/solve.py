@@ -59,7 +59,7 @@ class Solve:
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     auto: Switch = False
-    """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
+    """Click without a person where images and radar agree; with --clicks, only placements without a click."""
     propose: Switch = False
     """Solve nothing: list where the reflector probably stood, for a person or a script to confirm; --out keeps it as JSON."""
     clicks_out: OutFile = None

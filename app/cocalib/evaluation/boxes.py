@@ -15,12 +15,12 @@ _MAX_LABELS_BYTES = 256 * 1024 * 1024
 def find_boxes(
     file_or_topic: str, recording: Recording, *, progress: Callable[[int, int], None] | None = None
 ) -> Boxes:
-    """Return the boxes of a file, folder or zip archive, of a topic, or, for the word moving, of what changes in the picture.
+    """Return the boxes of a file, folder or zip archive, of a topic, or, for the word moving, of what changes in the image.
 
     Args:
         file_or_topic: what the user gave; a file or folder of that name comes first.
         recording: that the boxes belong to.
-        progress: called with the frames looked at and their number, if boxes are found in the pictures.
+        progress: called with the frames looked at and their number, if boxes are found in the images.
 
     Raises:
         InputError: there is no such file or topic, it is of no known format, or belongs to another recording.
@@ -63,7 +63,7 @@ def find_labels(path: Path) -> ReturnLabels:
 
 
 def _image_size_px(recording: Recording) -> tuple[int, int] | None:
-    """Return the width and height of the recorded pictures; None if the first cannot be read."""
+    """Return the width and height of the recorded images; None if the first cannot be read."""
     if not len(recording.image_times):
         return None
     try:

@@ -78,12 +78,12 @@ def compare_on_recording(
         options: of the search.
 
     Raises:
-        InputError: the two are of cameras with different pictures, or boxes and recording do not belong together.
+        InputError: the two are of cameras with different images, or boxes and recording do not belong together.
     """
     sizes = [(one.camera.width_px, one.camera.height_px) for one in calibrations]
     if sizes[0] != sizes[1]:
         raise InputError(
-            f"{names[0]} is for pictures of {sizes[0][0]} x {sizes[0][1]} px, {names[1]} for {sizes[1][0]} x {sizes[1][1]} px; "
+            f"{names[0]} is for images of {sizes[0][0]} x {sizes[0][1]} px, {names[1]} for {sizes[1][0]} x {sizes[1][1]} px; "
             "compare calibrations of one camera"
         )
     lens = calibrations[0].camera

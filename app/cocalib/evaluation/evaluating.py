@@ -35,7 +35,7 @@ _TURNED_RAD = np.deg2rad(4.0)
 
 
 class RadarRecording(RadarSource, Protocol):
-    """The part of a Recording that an evaluation needs: its radar, and none of its pictures."""
+    """The part of a Recording that an evaluation needs: its radar, and none of its images."""
 
     @property
     def radar_times(self) -> TimesNs:
@@ -90,7 +90,7 @@ def evaluate_recording(
     progress: Callable[[int, int], None] | None = None,
     options: EvidenceOptions | None = None,
 ) -> Evaluation:
-    """Judge a calibration on a recording; no picture is decoded.
+    """Judge a calibration on a recording; no image is decoded.
 
     Args:
         calibration: in whatever way it was made.
@@ -242,7 +242,7 @@ def _windows(recording: RadarRecording, boxes: Boxes) -> Iterator[RadarScans]:
 
 
 def _require_camera(boxes: Boxes, camera: Camera) -> None:
-    """Refuse boxes of pictures of another size.
+    """Refuse boxes of images of another size.
 
     Raises:
         InputError: the sizes differ.
@@ -250,7 +250,7 @@ def _require_camera(boxes: Boxes, camera: Camera) -> None:
     size = (camera.width_px, camera.height_px)
     if boxes.image_size_px is not None and boxes.image_size_px != size:
         raise InputError(
-            f"{boxes.source}: made on pictures of {boxes.image_size_px[0]} x {boxes.image_size_px[1]} px, but the "
+            f"{boxes.source}: made on images of {boxes.image_size_px[0]} x {boxes.image_size_px[1]} px, but the "
             f"calibration's camera has {size[0]} x {size[1]} px; give the boxes and the calibration of one camera"
         )
 

@@ -196,7 +196,7 @@ def judged_calibration(
         camera: the intrinsics, if the file has none.
 
     Raises:
-        InputError: there are no intrinsics, or they are of pictures of another size.
+        InputError: there are no intrinsics, or they are of images of another size.
     """
     recorded = recording.camera()
     calibration = calibration_of(found, str(path), camera or recorded)
@@ -210,7 +210,7 @@ def judged_calibration(
 
 
 def require_size(camera: Camera, recording: Recording, path: Path) -> None:
-    """Refuse a calibration for pictures of another size.
+    """Refuse a calibration for images of another size.
 
     Raises:
         InputError: the recording's camera has another size.
@@ -221,7 +221,7 @@ def require_size(camera: Camera, recording: Recording, path: Path) -> None:
     size, wanted = (camera.width_px, camera.height_px), (recorded.width_px, recorded.height_px)
     if size != wanted:
         raise InputError(
-            f"{path}: calibrated for pictures of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
+            f"{path}: calibrated for images of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
             f"{wanted[1]} px; give the calibration of this camera"
         )
 

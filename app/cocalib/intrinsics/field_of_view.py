@@ -20,5 +20,5 @@ def field_of_view_text(camera: Camera) -> str:
     """Say how wide a camera sees."""
     across, down = field_of_view_deg(camera)
     if not np.isfinite([across, down]).all():
-        return "not known: the distortion folds back before the edges of the picture"
+        return "not known: the distortion folds back before the edges of the image"
     return f"{across:.1f}° × {down:.1f}°"

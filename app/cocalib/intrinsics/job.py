@@ -10,7 +10,7 @@ from calib_core.errors import CalibrationError, InputError
 from calib_core.intrinsics import (
     Board,
     BoardCorners,
-    BoardPictures,
+    BoardImages,
     BoardSearch,
     CalibratedLens,
     SearchProgress,
@@ -33,7 +33,7 @@ class LensSnapshot:
     Attributes:
         stage: what is being done; "idle" before the first start.
         board: that is looked for; None before the first start.
-        progress: of the search; None before its first picture.
+        progress: of the search; None before its first image.
         doing: what is computed, once the search is over.
         problem: why there is no result, if the stage is "failed".
         hint: what to do about it.
@@ -82,14 +82,14 @@ class LensJob:
         """The present state."""
         return self._snapshot
 
-    def start(self, pictures: BoardPictures, board: Board, model: LensChoice) -> None:
+    def start(self, images: BoardImages, board: Board, model: LensChoice) -> None:
         """Start, or go on from the views of a cancelled search for the same board; returns immediately.
 
         Raises:
-            InputError: a calibration is running, or there are no pictures.
+            InputError: a calibration is running, or there are no images.
         """
-        if not len(pictures):
-            raise InputError("there are no pictures to look for the board in; give a recording with a camera")
+        if not len(images):
+            raise InputError("there are no images to look for the board in; give a recording with a camera")
         with self._lock:
             if self._closed:
                 raise InputError("the recording is being closed; open it again to calibrate its lens")
@@ -100,7 +100,7 @@ class LensJob:
             self._stop = threading.Event()
             self._snapshot = LensSnapshot("searching", board, known, search=before.search, lens=before.lens)
             self._thread = threading.Thread(
-                target=self._run, args=(pictures, board, model, known, self._stop), name="lens", daemon=True
+                target=self._run, args=(images, board, model, known, self._stop), name="lens", daemon=True
             )
             self._thread.start()
         self._changed()
@@ -120,7 +120,7 @@ class LensJob:
 
     def _run(
         self,
-        pictures: BoardPictures,
+        images: BoardImages,
         board: Board,
         model: LensChoice,
         known: SearchProgress | None,
@@ -129,7 +129,7 @@ class LensJob:
         with error_boundary("calibrating the lens", self._failed):
             try:
                 found = calibrate_from(
-                    pictures,
+                    images,
                     board,
                     model,
                     known=known.views if known else (),
@@ -167,7 +167,7 @@ class LensJob:
 
 
 def calibrate_from(
-    pictures: BoardPictures,
+    images: BoardImages,
     board: Board,
     model: LensChoice = "auto",
     *,
@@ -176,18 +176,18 @@ def calibrate_from(
     progress: Callable[[SearchProgress | str], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[BoardSearch, CalibratedLens] | Unsolvable:
-    """Find the board in pictures, and calibrate the lens that took them.
+    """Find the board in images, and calibrate the lens that took them.
 
     Args:
-        pictures: where to look.
+        images: where to look.
         board: what to look for.
         model: of the lens.
         known: views of an earlier search.
-        searched: numbers of the pictures that it looked at.
+        searched: numbers of the images that it looked at.
         progress: called while the board is looked for, and then with what is done next, in words.
         stopped: asked often; once it is true there is no calibration.
     """
-    search = search_boards(pictures, board, known=known, searched=searched, progress=progress, stopped=stopped)
+    search = search_boards(images, board, known=known, searched=searched, progress=progress, stopped=stopped)
     if isinstance(search, Unsolvable):
         return search
     if stopped():

@@ -5,28 +5,28 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from calib_core.interchange.own.board_views_json import BoardViews, runs_of
-from calib_core.interchange.own.lens_documents import PictureSource
+from calib_core.interchange.own.lens_documents import ImageSource
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress, search_boards
 from calib_core.measurements import Unsolvable
-from cocalib.intrinsics.picture_sources import OpenPictures
+from cocalib.intrinsics.image_sources import OpenImages
 
 
 class ResumedSearch:
-    """Searches pictures in a thread of its own, so that Ctrl+C in the main thread stops it between two pictures."""
+    """Searches images in a thread of its own, so that Ctrl+C in the main thread stops it between two images."""
 
-    def __init__(self, pictures: OpenPictures, board: Board, source_name: str) -> None:
+    def __init__(self, images: OpenImages, board: Board, source_name: str) -> None:
         """Set up the search.
 
         Args:
-            pictures: where to look.
+            images: where to look.
             board: what to look for.
-            source_name: what messages call the pictures.
+            source_name: what messages call the images.
         """
         self._board = board
-        self._pictures = pictures
-        self._progress = SearchProgress(0, len(pictures))
+        self._images = images
+        self._progress = SearchProgress(0, len(images))
         self._complete = False
-        self.source = PictureSource(source_name, len(pictures), pictures.digest())
+        self.source = ImageSource(source_name, len(images), images.digest())
 
     def resume(self, earlier: BoardViews, *, file: str) -> None:
         """Go on from what an earlier search has found.
@@ -36,11 +36,11 @@ class ResumedSearch:
             file: where it was kept, for messages.
 
         Raises:
-            InputError: it was for another board or in other pictures.
+            InputError: it was for another board or in other images.
         """
         earlier.require_same(self._board, self.source, file=file)
         indices = earlier.searched_indices()
-        self._progress = SearchProgress(len(indices), len(self._pictures), earlier.views, indices=indices)
+        self._progress = SearchProgress(len(indices), len(self._images), earlier.views, indices=indices)
 
     def run(self, progress: Callable[[SearchProgress], None]) -> BoardSearch | Unsolvable:
         """Search what was not searched earlier.
@@ -61,7 +61,7 @@ class ResumedSearch:
         with ThreadPoolExecutor(1, "board search") as thread:
             future = thread.submit(
                 search_boards,
-                self._pictures,
+                self._images,
                 self._board,
                 known=earlier.views,
                 searched=earlier.indices,
@@ -78,12 +78,12 @@ class ResumedSearch:
 
     @property
     def views(self) -> BoardViews:
-        """What was found so far, to be kept in a file; pictures that could not be read are tried again."""
+        """What was found so far, to be kept in a file; images that could not be read are tried again."""
         now = self._progress
         searched = set(now.indices) - {one.index for one in now.left_out}
         return BoardViews(self._board, self.source, now.views, runs_of(searched), complete=self._complete)
 
     @property
     def looked_at(self) -> int:
-        """How many pictures have been looked at, in earlier searches too."""
+        """How many images have been looked at, in earlier searches too."""
         return self._progress.searched

@@ -204,9 +204,9 @@ def _camera(choice: Choice, recording: Recording, calibration: "GivenCalibration
     if not len(recording.image_times):
         return None
     if choice.camera_file is None and calibration is not None and recording.camera() is None:
-        picture = recording.image_bytes(0)
+        image = recording.image_bytes(0)
         with part_of_choice("calibration"):
-            found = calibration.camera((picture.width_px, picture.height_px))
+            found = calibration.camera((image.width_px, image.height_px))
         if found is not None:
             return found
     if choice.camera_file is None:
@@ -277,7 +277,7 @@ def _require_nothing_to_calibrate(recording: Recording, choice: Choice) -> None:
     Raises:
         UnusablePartError: a file of intrinsics, of a calibration or of clicks was given.
     """
-    name, found = recording.paths[0].name, _unusable_pictures(recording)
+    name, found = recording.paths[0].name, _unusable_images(recording)
     camera, clicks = choice.camera_file, choice.clicks
     given: dict[ChoicePart, str | Path | None] = {
         "camera": camera.source if camera else None,
@@ -287,12 +287,12 @@ def _require_nothing_to_calibrate(recording: Recording, choice: Choice) -> None:
     for part, file in given.items():
         if file:
             raise UnusablePartError(
-                part, f"{name}: no pictures{found}, so {file} cannot be used; give the camera's recording as well"
+                part, f"{name}: no images{found}, so {file} cannot be used; give the camera's recording as well"
             )
-    print(f"{name}: no pictures{found}: showing the radar only. To calibrate, give the camera's recording as well.")
+    print(f"{name}: no images{found}: showing the radar only. To calibrate, give the camera's recording as well.")
 
 
-def _unusable_pictures(recording: Recording) -> str:
+def _unusable_images(recording: Recording) -> str:
     """Return which image topics cannot be used and why, in brackets; "" if there are none."""
     problems = [
         f"{topic.name}: {topic.problem or 'has no messages'}" for topic in recording.topics if topic.kind == "image"
@@ -337,7 +337,7 @@ class FittingClicks:
 
 
 def fitting_clicks(folder: Path, facts: RecordingFacts) -> FittingClicks:
-    """Return the clicks of a session whose stamp is that of a frame, on the picture.
+    """Return the clicks of a session whose stamp is that of a frame, on the image.
 
     Raises:
         SessionFileError: the session cannot be read.
@@ -375,10 +375,10 @@ def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path 
 
 
 def camera_of(found: ImportedCalibration, path: Path, size_px: tuple[int, int]) -> Camera | None:
-    """Return the camera of a calibration for pictures of a size; None if it has none.
+    """Return the camera of a calibration for images of a size; None if it has none.
 
     Raises:
-        InputError: its matrix is not a camera's, or is that of pictures of another size.
+        InputError: its matrix is not a camera's, or is that of images of another size.
     """
     if found.camera is None and found.matrix_px is not None:
         refuse_another_size(found.matrix_px, size_px, str(path))
@@ -432,7 +432,7 @@ class GivenCalibration:
         """Return its camera if it has this image size, else None.
 
         Raises:
-            InputError: its matrix is not a camera's, or is that of pictures of another size.
+            InputError: its matrix is not a camera's, or is that of images of another size.
         """
         if isinstance(self.content, UnstatedFile):
             sized = None if self.content.camera is None or self.content.camera.size_px is None else self.content.camera

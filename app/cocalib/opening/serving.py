@@ -13,7 +13,7 @@ import calib_core.recordings as recordings
 from calib_core.errors import CalibrationError, InputError, RecordingError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile
-from calib_core.recordings import Recording, TopicSummary, first_picture
+from calib_core.recordings import Recording, TopicSummary, first_image
 from cocalib.opening.choice import Choice, ChoicePart, UnusablePartError
 from cocalib.opening.opened import Opened, open_choice, session_offer, with_remembered
 from cocalib.opening.recent import RecentRecordings
@@ -281,9 +281,7 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     if not choice.is_sample and closed.clicks:
         serving.recent.add(choice.paths, choice.title, closed.clicks)
     with contextlib.suppress(OSError):  # the terminal may be gone
-        print(
-            f"\n{'Closed' if goes_on else 'Stopped'}; {closed.note}." if workspace.facts.has_pictures else "\nStopped."
-        )
+        print(f"\n{'Closed' if goes_on else 'Stopped'}; {closed.note}." if workspace.facts.has_images else "\nStopped.")
     return not goes_on
 
 
@@ -309,7 +307,7 @@ def _service(first: Choice | None, serving: Serving, desk: OpeningDesk) -> Servi
     return Service(
         serving.link,
         _opening(first),
-        partial(first_picture, () if first.follow else first.paths, with_remembered(first)),
+        partial(first_image, () if first.follow else first.paths, with_remembered(first)),
         let_in_after_s=0.0 if first.follow or _size_bytes(first) >= _LARGE_BYTES else _SOON_S,
         desk=desk,
     )
@@ -342,7 +340,7 @@ def _choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
     """Describe what can be chosen instead of what is open."""
     workspace = opened.workspace
     described = _described(choice, opened.recording)
-    folder = workspace.restored.folder if workspace.facts.has_pictures else None
+    folder = workspace.restored.folder if workspace.facts.has_images else None
     return replace(
         described,
         is_open=True,

@@ -70,8 +70,8 @@ def _numbers() -> list[signal.Signals]:
 def keep_freed_memory() -> bool:
     """Make the C library keep up to 64 MB of freed memory instead of returning it to the system at once.
 
-    A picture's pixels take megabytes that are allocated and freed with every frame. Getting them from the system each time,
-    page by page, takes as long as decoding the picture. All threads share what is kept, or each would keep as much.
+    An image's pixels take megabytes that are allocated and freed with every frame. Getting them from the system each time,
+    page by page, takes as long as decoding the image. All threads share what is kept, or each would keep as much.
 
     Returns:
         False if the C library has no such setting (it is not glibc).

@@ -4,12 +4,12 @@ from cocalib.report.making import against_of, current_report, known_calibration,
 from cocalib.report.page import report_html
 from cocalib.report.printing import PrintingError, print_pdf
 from cocalib.report.sections.acceptance import limits_met
-from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
+from cocalib.report.subject import Against, Image, Judged, ReportSubject, Watched
 
 __all__ = [
     "Against",
+    "Image",
     "Judged",
-    "Picture",
     "PrintingError",
     "ReportSubject",
     "Watched",

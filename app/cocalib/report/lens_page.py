@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.own.lens_documents import PictureSource
+from calib_core.interchange.own.lens_documents import ImageSource
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     CalibratedLens,
@@ -29,14 +29,14 @@ _MOST_POINTS = 1500
 _LONGEST = 22.0
 
 
-def lens_report_html(lens: CalibratedLens, source: PictureSource, coverage: Coverage, *, searched: int) -> str:
+def lens_report_html(lens: CalibratedLens, source: ImageSource, coverage: Coverage, *, searched: int) -> str:
     """Return the report as HTML that is well-formed XML, too; the same lens gives the same bytes.
 
     Args:
         lens: with its views.
-        source: of the pictures.
+        source: of the images.
         coverage: of the used views.
-        searched: how many pictures were looked at.
+        searched: how many images were looked at.
     """
     body = tag(
         "body",
@@ -45,8 +45,8 @@ def lens_report_html(lens: CalibratedLens, source: PictureSource, coverage: Cove
             "main",
             _answer(lens, searched),
             _warning_list(lens),
-            _uncertainty_over_the_picture(lens),
-            _residuals_over_the_picture(lens),
+            _uncertainty_over_the_image(lens),
+            _residuals_over_the_image(lens),
             _coverage_of_views(lens, coverage),
             _errors_of_views(lens),
             _view_table(lens),
@@ -62,7 +62,7 @@ def _answer(lens: CalibratedLens, searched: int) -> Markup:
     said = (
         f"{camera.model}, {camera.width_px} x {camera.height_px} px, field of view {field_of_view_text(camera)}. "
         f"RMS {lens.rms_px:.3f} px in {len(lens.views)} used views, {lens.held_out_rms_px:.3f} px in views left out in turn; "
-        f"{searched} pictures searched, {len(lens.left_out)} left out."
+        f"{searched} images searched, {len(lens.left_out)} left out."
     )
     return tag(
         "section",
@@ -80,7 +80,7 @@ def _board_text(lens: CalibratedLens) -> str:
 def _foot() -> str:
     return (
         "Pixel (0, 0) is the centre of the top-left pixel. Sigma is one standard deviation. Held out: with the lens calibrated "
-        "without that view. The same pictures give the same file, byte for byte."
+        "without that view. The same images give the same file, byte for byte."
     )
 
 
@@ -142,11 +142,11 @@ def _view_table(lens: CalibratedLens) -> Markup:
 
 
 def _left_out_table(lens: CalibratedLens) -> Markup:
-    """Return the pictures that were not used, with the reasons."""
+    """Return the images that were not used, with the reasons."""
     rows = [tag("li", tag("b", one.name), f": {one.reason}") for one in lens.left_out[:_MOST_ROWS]]
     if len(lens.left_out) > _MOST_ROWS:
         rows.append(tag("li", f"{len(lens.left_out) - _MOST_ROWS} more."))
-    body = tag("ul", *rows) if rows else tag("p", "None: every picture with a board was used.", class_="note")
+    body = tag("ul", *rows) if rows else tag("p", "None: every image with a board was used.", class_="note")
     return tag("section", tag("h2", "Left out"), body, id="left-out")
 
 
@@ -163,8 +163,8 @@ def _pixels(value: float) -> str:
     return f"{value:.3f}" if math.isfinite(value) else "–"
 
 
-def _residuals_over_the_picture(lens: CalibratedLens) -> Markup:
-    """Return the mean residuals as arrows over the picture, and all residuals as a scatter."""
+def _residuals_over_the_image(lens: CalibratedLens) -> Markup:
+    """Return the mean residuals as arrows over the image, and all residuals as a scatter."""
     found = residual_field(lens)
     return tag(
         "section",
@@ -180,13 +180,15 @@ def _arrows(found: ResidualField, camera: Camera) -> Markup:
     there = np.isfinite(means).all(axis=1)
     longest = float(np.hypot(*means[there].T).max()) if there.any() else 0.0
     gain = _LONGEST / max(longest, 1e-9)
-    shapes: list[Child] = [_picture_frame(camera)]
+    shapes: list[Child] = [_image_frame(camera)]
     for x, y, (du, dv) in zip(x_px[there], y_px[there], means[there].tolist(), strict=True):
         at_u, at_v = _places(camera, x, y)
         shapes.append(tag("line", x1=at_u, y1=at_v, x2=at_u + gain * du, y2=at_v + gain * dv, class_="vector"))
         shapes.append(tag("circle", cx=at_u, cy=at_v, r=1.6, class_="used"))
-    said = f"Mean residual of each part of the picture; the longest line is {plain(longest, 2)} px. {residuals_text(found)}"
-    return captioned("Mean residuals", _over_picture(said, camera, *shapes), said)
+    said = (
+        f"Mean residual of each part of the image; the longest line is {plain(longest, 2)} px. {residuals_text(found)}"
+    )
+    return captioned("Mean residuals", _over_image(said, camera, *shapes), said)
 
 
 def _scatter(found: ResidualField) -> Markup:
@@ -200,33 +202,33 @@ def _scatter(found: ResidualField) -> Markup:
     return captioned("All residuals", drawing(said, axes.drawn("right [px]", "down, negative [px]"), *points), said)
 
 
-def _uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
+def _uncertainty_over_the_image(lens: CalibratedLens) -> Markup:
     """Return how far the projection of far points is known, and two halves of the views calibrated separately."""
     grid = projection_uncertainty(lens, columns=16, rows=10)
     sigmas = grid.sigma_px
     finite = sigmas[np.isfinite(sigmas)]
     span = f"{plain(float(finite.min()), 2)} to {plain(float(finite.max()), 2)} px" if len(finite) else "not known"
     said = f"Standard deviation of a far point's pixel: {span}; the darker, the less is known. {MODEL_ERRORS_UNSEEN}"
-    drawn = _over_picture(said, lens.camera, *_cells(sigmas, lens.camera), _picture_frame(lens.camera))
+    drawn = _over_image(said, lens.camera, *_cells(sigmas, lens.camera), _image_frame(lens.camera))
     shown: list[Child] = [captioned("Projection uncertainty", drawn, said)]
     halves = split_difference(lens)
     if isinstance(halves, Unsolvable):
         shown.append(tag("p", f"Not cross-checked: {halves_text(halves)}", class_="note"))
     else:
         cells = _cells(halves.apart_px, lens.camera)
-        drawn = _over_picture(halves_text(halves), lens.camera, *cells, _picture_frame(lens.camera))
+        drawn = _over_image(halves_text(halves), lens.camera, *cells, _image_frame(lens.camera))
         words = f"Distance between the projections of both lenses. {halves_text(halves)}"
         shown.append(captioned("Halves calibrated separately", drawn, words))
     return tag("section", tag("h2", "How well the lens is known"), tag("div", *shown, class_="two"), id="uncertainty")
 
 
 def covered(lens: CalibratedLens, coverage: Coverage) -> Markup:
-    """Return how many corners lie in each part of the picture."""
+    """Return how many corners lie in each part of the image."""
     camera = lens.camera
     rows, columns = coverage.counts.shape
     most = max(int(coverage.counts.max()), 1)
     height = _height(camera)
-    shapes: list[Child] = [_picture_frame(camera)]
+    shapes: list[Child] = [_image_frame(camera)]
     for row in range(rows):
         for column in range(columns):
             count = int(coverage.counts[row, column])
@@ -236,8 +238,8 @@ def covered(lens: CalibratedLens, coverage: Coverage) -> Markup:
             shapes.append(
                 text(left + _WIDTH / columns / 2, top + height / rows / 2 + 3, str(count), class_="middle label")
             )
-    said = f"Corners in each part of the picture; {100.0 * coverage.share:.0f} % of it is covered."
-    return captioned("In the picture", _over_picture(said, camera, *shapes), said)
+    said = f"Corners in each part of the image; {100.0 * coverage.share:.0f} % of it is covered."
+    return captioned("In the image", _over_image(said, camera, *shapes), said)
 
 
 def _share_text(value: float) -> str:
@@ -269,7 +271,7 @@ def _cell(left: float, top: float, width: float, height: float, shade: str) -> M
     return tag("rect", x=left, y=top, width=width, height=height, class_="shaded", fill_opacity=shade)
 
 
-def _picture_frame(camera: Camera) -> Markup:
+def _image_frame(camera: Camera) -> Markup:
     return tag("rect", x=0.0, y=0.0, width=_WIDTH, height=_height(camera), class_="frame")
 
 
@@ -282,7 +284,7 @@ def _places(camera: Camera, u_px: float, v_px: float) -> tuple[float, float]:
     return (u_px + 0.5) * scale, (v_px + 0.5) * scale
 
 
-def _over_picture(alternative: str, camera: Camera, *shapes: Child) -> Markup:
+def _over_image(alternative: str, camera: Camera, *shapes: Child) -> Markup:
     return drawing(alternative, *shapes, width=_WIDTH, height=_height(camera))
 
 

@@ -17,7 +17,7 @@ from cocalib.evaluation.recording_check import calibration_of
 from cocalib.platform.resources import version
 from cocalib.recorded_view import seen_in
 from cocalib.report.page import report_html
-from cocalib.report.subject import Against, Picture, ReportSubject, Watched
+from cocalib.report.subject import Against, Image, ReportSubject, Watched
 
 _WIDTH_PX = 640
 _QUALITY = 70
@@ -90,18 +90,18 @@ def watched(
     """
     topics = (
         ("radar", recording.radar_topic, recording.radar_clock),
-        ("pictures", recording.image_topic, recording.image_clock),
+        ("images", recording.image_topic, recording.image_clock),
     )
     return Watched(
         name=recording.name,
         inputs=inputs,
         topics=tuple((what, f"{name}, by {clock} stamps" if clock else name) for what, name, clock in topics if name),
         warnings=(*(DataWarning.reported(one.code, one.message, one.hint) for one in doubts), *recording.warnings),
-        picture=_picture(recording, calibration),
+        image=_image(recording, calibration),
     )
 
 
-def _picture(recording: Recording, calibration: Calibration | None) -> Picture | None:
+def _image(recording: Recording, calibration: Calibration | None) -> Image | None:
     """Return the frame of the first pair in the recording, else the middle one; None if it cannot be read or has another size."""
     if calibration is None or not len(recording.image_times):
         return None
@@ -119,7 +119,7 @@ def _picture(recording: Recording, calibration: Calibration | None) -> Picture |
     grey = cv2.cvtColor(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
     _, jpeg = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     sec, nanosec = time_parts(TimeNs(int(recording.image_times[index])))
-    return Picture(jpeg.tobytes(), f"the frame at {sec}.{nanosec:09d} s", _returns_px(recording, calibration, index))
+    return Image(jpeg.tobytes(), f"the frame at {sec}.{nanosec:09d} s", _returns_px(recording, calibration, index))
 
 
 def _returns_px(recording: Recording, calibration: Calibration, index: int) -> tuple[tuple[float, float], ...]:

@@ -17,7 +17,7 @@ from cocalib.report.sections.residuals import residuals
 from cocalib.report.sections.uncertainty import uncertainty
 from cocalib.report.subject import ReportSubject
 
-_PICTURE_WIDTH = 320.0
+_IMAGE_WIDTH = 320.0
 
 
 def report_html(subject: ReportSubject) -> str:
@@ -59,10 +59,10 @@ def _of_pairs(subject: ReportSubject, calibration: Calibration) -> list[Child]:
         rows, of = rows_of_pairs(calibration), "of the calibration's own pairs"
     if not len(rows):
         return []
-    with_picture = subject.recording is not None and subject.recording.picture is not None
+    with_image = subject.recording is not None and subject.recording.image is not None
     return [
-        residuals(calibration, rows, of=of, with_picture=with_picture),
-        coverage(calibration, rows, with_picture=with_picture),
+        residuals(calibration, rows, of=of, with_image=with_image),
+        coverage(calibration, rows, with_image=with_image),
         pair_table(rows),
     ]
 
@@ -82,13 +82,13 @@ def _what(subject: ReportSubject) -> Markup:
 def _definitions(subject: ReportSubject) -> Markup | None:
     """Return the frame that several drawings use, once."""
     calibration = subject.calibration
-    picture = subject.recording.picture if subject.recording is not None else None
-    if picture is None or calibration is None:
+    image = subject.recording.image if subject.recording is not None else None
+    if image is None or calibration is None:
         return None
-    height = _PICTURE_WIDTH * calibration.camera.height_px / calibration.camera.width_px
-    data = f"data:image/jpeg;base64,{base64.b64encode(picture.jpeg).decode('ascii')}"
+    height = _IMAGE_WIDTH * calibration.camera.height_px / calibration.camera.width_px
+    data = f"data:image/jpeg;base64,{base64.b64encode(image.jpeg).decode('ascii')}"
     frame = Markup(
-        f'<image id="picture" width="{_PICTURE_WIDTH:g}" height="{height:.2f}" preserveAspectRatio="none" href="{data}"/>'
+        f'<image id="image" width="{_IMAGE_WIDTH:g}" height="{height:.2f}" preserveAspectRatio="none" href="{data}"/>'
     )
     return tag("svg", tag("defs", frame), class_="definitions", aria_hidden="true", xmlns="http://www.w3.org/2000/svg")
 

@@ -228,7 +228,7 @@ def azimuth_sentence(rows: ResidualRows) -> str:
 
 
 def place_sentence(rows: ResidualRows, image_size_px: tuple[int, int]) -> str:
-    """Say whether residuals go with the place in the picture: along columns, rows, or the distance from its middle."""
+    """Say whether residuals go with the place in the image: along columns, rows, or the distance from its middle."""
     pixels, lengths = rows.pixels_px[rows.judged], rows.lengths_px[rows.judged]
     centre = (np.array(image_size_px) - 1) / 2
     ways = (
@@ -236,8 +236,8 @@ def place_sentence(rows: ResidualRows, image_size_px: tuple[int, int]) -> str:
         (pixels[:, 1], "to the lower edge", "to the upper edge"),
         (
             np.linalg.norm(pixels - centre, axis=1),
-            "away from the middle of the picture",
-            "towards the middle of the picture",
+            "away from the middle of the image",
+            "towards the middle of the image",
         ),
     )
     tried = [(found, up, down) for values, up, down in ways if (found := trend(values, lengths)) is not None]
@@ -245,7 +245,7 @@ def place_sentence(rows: ResidualRows, image_size_px: tuple[int, int]) -> str:
         return _too_few(rows)
     found, up, down = min(tried, key=lambda one: one[0].p_value)
     if found.p_value >= _SURE / 3:
-        return f"No trend across the picture: along columns, along rows, from the middle outwards{_chance(found)}."
+        return f"No trend across the image: along columns, along rows, from the middle outwards{_chance(found)}."
     where = up if found.correlation > 0 else down
     cause = (
         "; a wrong distortion of the lens shows like this" if up.startswith("away") and found.correlation > 0 else ""

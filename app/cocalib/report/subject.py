@@ -9,7 +9,7 @@ from calib_core.results import Calibration, DataWarning, InputFile
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class Image:
     """A frame to draw over.
 
     Attributes:
@@ -32,14 +32,14 @@ class Watched:
         inputs: its files, by their content.
         topics: what was read from it, as (what, topic).
         warnings: of reading it.
-        picture: one of its frames; None if none can be read.
+        image: one of its frames; None if none can be read.
     """
 
     name: str
     inputs: tuple[InputFile, ...]
     topics: tuple[tuple[str, str], ...] = ()
     warnings: tuple[DataWarning, ...] = ()
-    picture: Picture | None = None
+    image: Image | None = None
 
 
 @dataclass(frozen=True, slots=True)

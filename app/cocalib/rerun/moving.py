@@ -1,4 +1,4 @@
-"""What changes with time (radar cloud, pictures with returns, boxes, clicks, figures), and how the viewer lays it out."""
+"""What changes with time (radar cloud, images with returns, boxes, clicks, figures), and how the viewer lays it out."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -21,9 +21,9 @@ from cocalib.rerun.unmoving import (
     BOXES,
     CLICKED_NOW,
     HALF_PIXEL_PX,
+    IMAGE,
     LARGE_PX,
     METRICS,
-    PICTURE,
     RADAR,
     RESIDUALS,
     RETURNS,
@@ -45,7 +45,7 @@ class Streamed:
     """What was written so far.
 
     Attributes:
-        frames: number of pictures.
+        frames: number of images.
         skipped: frames that are left out.
     """
 
@@ -68,11 +68,11 @@ def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[Tim
 
 
 def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Streamed) -> Iterator[int]:
-    """Write the pictures with everything that is drawn over them; yield the number of frames done."""
+    """Write the images with everything that is drawn over them; yield the number of frames done."""
     pairs, boxes = view.pairs_by_frame(), view.boxes_by_frame()
     labels = view.boxes.labels if view.boxes else ()
     for block in frame_blocks(view.recording):
-        yield from _stream_pictures(stream, view, block, streamed)
+        yield from _stream_images(stream, view, block, streamed)
         _stream_returns(stream, view, block, streamed)
         if pairs:
             _stream_clicks(stream, block, pairs)
@@ -80,38 +80,38 @@ def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Stre
             _stream_boxes(stream, block, boxes, labels)
 
 
-def _stream_pictures(
+def _stream_images(
     stream: rr.RecordingStream, view: RecordedView, block: FrameBlock, streamed: Streamed
 ) -> Iterator[int]:
-    """Write the recorded pictures, untouched, some megabytes at a time."""
-    pictures: list[bytes] = []
+    """Write the recorded images, untouched, some megabytes at a time."""
+    images: list[bytes] = []
     formats: list[str] = []
     times: list[int] = []
     for place, time in enumerate(block.times_ns.tolist()):
         try:
-            picture = view.recording.image_bytes(block.first + place)
+            image = view.recording.image_bytes(block.first + place)
         except MessageError as error:
             streamed.skipped.add_unreadable(error)
             continue
-        pictures.append(picture.data)
-        formats.append(f"image/{picture.format}")
+        images.append(image.data)
+        formats.append(f"image/{image.format}")
         times.append(time)
-        if sum(map(len, pictures)) >= _CHUNK_BYTES:
-            _send_pictures(stream, pictures, formats, times, streamed)
-            pictures, formats, times = [], [], []
+        if sum(map(len, images)) >= _CHUNK_BYTES:
+            _send_images(stream, images, formats, times, streamed)
+            images, formats, times = [], [], []
             yield block.first + place
-    if pictures:
-        _send_pictures(stream, pictures, formats, times, streamed)
+    if images:
+        _send_images(stream, images, formats, times, streamed)
     yield block.first + len(block.times_ns)
 
 
-def _send_pictures(
-    stream: rr.RecordingStream, pictures: list[bytes], formats: list[str], times: list[int], streamed: Streamed
+def _send_images(
+    stream: rr.RecordingStream, images: list[bytes], formats: list[str], times: list[int], streamed: Streamed
 ) -> None:
-    columns = rr.EncodedImage.columns(blob=pictures, media_type=formats)
-    stream.send_columns(PICTURE, [_times(np.array(times, dtype=np.int64))], columns)
+    columns = rr.EncodedImage.columns(blob=images, media_type=formats)
+    stream.send_columns(IMAGE, [_times(np.array(times, dtype=np.int64))], columns)
     stream.flush()
-    streamed.frames += len(pictures)
+    streamed.frames += len(images)
 
 
 def _stream_returns(stream: rr.RecordingStream, view: RecordedView, block: FrameBlock, streamed: Streamed) -> None:
@@ -201,7 +201,7 @@ def _log_clicks(stream: rr.RecordingStream, pairs: Sequence[PairResult]) -> None
 
 def stream_figures(stream: rr.RecordingStream, view: RecordedView) -> None:
     """Write the residual of each clicked frame, AED as a line, and Acc of each frame that counts."""
-    stream.log(RETURNS_SEEN, rr.SeriesLines(names="returns in the picture", colors=(108, 199, 255)), static=True)
+    stream.log(RETURNS_SEEN, rr.SeriesLines(names="returns in the image", colors=(108, 199, 255)), static=True)
     known = [(pair.image_time, pair.distance_px) for pair in view.pairs if np.isfinite(pair.distance_px)]
     residuals = sorted((time, length_px) for time, length_px in known if time is not None)
     if residuals:
@@ -228,19 +228,19 @@ def _times(times_ns: TimesNs) -> rr.TimeColumn:
 
 def layout(view: RecordedView) -> rrb.Blueprint:
     """Return the blueprint for what there is to show."""
-    series = [_series("Returns in the picture", RETURNS_SEEN)]
+    series = [_series("Returns in the image", RETURNS_SEEN)]
     if view.pairs:
         series.insert(0, _series("Residuals [px]", RESIDUALS, AED))
     if view.acc_by_frame():
         series.insert(0, _series("Acc [%]", ACC))
-    picture = rrb.Spatial2DView(origin=PICTURE, name="Picture")
+    image = rrb.Spatial2DView(origin=IMAGE, name="Image")
     far_m = view.colours.high if view.colours.quantity == "range" else 30.0
     eye = rrb.EyeControls3D(
         position=(-0.35 * far_m, 0.0, 0.35 * far_m), look_target=(0.3 * far_m, 0.0, 0.0), eye_up=(0, 0, 1)
     )
     space = rrb.Spatial3DView(origin=RADAR, name="Radar frame", background=_BACKGROUND, eye_controls=eye)
     summary = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    left = rrb.Vertical(picture, *series, row_shares=[3.0, *([1.0] * len(series))])
+    left = rrb.Vertical(image, *series, row_shares=[3.0, *([1.0] * len(series))])
     right = rrb.Vertical(space, summary, row_shares=[3.0, 1.6])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[1.2, 1.0]),

@@ -24,17 +24,17 @@ _REFLECTORS = f"{RADAR}/reflectors"
 CAMERA = f"{RADAR}/camera"
 _CAMERA_POSITION = f"{RADAR}/camera_position_95"
 _AGAINST_CAMERA = f"{RADAR}/against"
-PICTURE = f"{CAMERA}/picture"
-SEEN_RETURNS = f"{PICTURE}/returns"
-AGAINST_RETURNS = f"{PICTURE}/returns_against"
-BOXES = f"{PICTURE}/boxes"
-PAIRS = f"{PICTURE}/all_clicks"
-CLICKED_NOW = f"{PICTURE}/clicked_now"
+IMAGE = f"{CAMERA}/image"
+SEEN_RETURNS = f"{IMAGE}/returns"
+AGAINST_RETURNS = f"{IMAGE}/returns_against"
+BOXES = f"{IMAGE}/boxes"
+PAIRS = f"{IMAGE}/all_clicks"
+CLICKED_NOW = f"{IMAGE}/clicked_now"
 METRICS = "metrics"
 RESIDUALS = f"{METRICS}/residual_px"
 AED = f"{METRICS}/aed_px"
 ACC = f"{METRICS}/acc_percent"
-RETURNS_SEEN = f"{METRICS}/returns_in_picture"
+RETURNS_SEEN = f"{METRICS}/returns_in_image"
 SUMMARY = "summary"
 HALF_PIXEL_PX = 0.5
 """Rerun's (0, 0) is the corner of the top-left pixel, ours its centre."""
@@ -53,7 +53,7 @@ def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
     stream.log(RADAR, rr.TransformAxes3D(1.0), static=True)
     stream.log(RETURNS, rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.5)), static=True)
     stream.log(SEEN_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(4.0), draw_order=30.0), static=True)
-    _log_camera(stream, CAMERA, PICTURE, view.calibration, _FRUSTUM_SHARE * far_m, _CAMERA)
+    _log_camera(stream, CAMERA, IMAGE, view.calibration, _FRUSTUM_SHARE * far_m, _CAMERA)
     if view.against is not None:
         stream.log(AGAINST_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(3.0)), static=True)
         _log_camera(
@@ -68,7 +68,7 @@ def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
 def _log_camera(
     stream: rr.RecordingStream,
     entity: str,
-    picture: str,
+    image: str,
     calibration: Calibration,
     depth_m: float,
     colour: tuple[int, int, int],
@@ -77,7 +77,7 @@ def _log_camera(
     radar_from_camera = calibration.camera_from_radar.inverse()
     pose = rr.Transform3D(translation=radar_from_camera.translation_m, mat3x3=radar_from_camera.rotation)
     stream.log(entity, pose, static=True)
-    stream.log(picture, _pinhole(calibration.camera, depth_m, colour), static=True)
+    stream.log(image, _pinhole(calibration.camera, depth_m, colour), static=True)
 
 
 def _pinhole(camera: Camera, depth_m: float, colour: tuple[int, int, int]) -> rr.Pinhole:
@@ -110,7 +110,7 @@ def _log_camera_position(stream: rr.RecordingStream, calibration: Calibration) -
 
 
 def _log_pairs(stream: rr.RecordingStream, view: RecordedView) -> None:
-    """Write all clicks over the picture, and the reflectors with their 95 % ellipsoids in the radar's frame."""
+    """Write all clicks over the image, and the reflectors with their 95 % ellipsoids in the radar's frame."""
     pairs = [pair for pair in view.pairs if np.isfinite(pair.projected_px).all()]
     colours = residual_colours(np.array([pair.distance_px for pair in pairs]), LARGE_PX)
     lines = [np.array([pair.pixel_px, pair.projected_px]) + HALF_PIXEL_PX for pair in pairs]
@@ -167,7 +167,7 @@ def _ellipsoids(
 
 
 def summary_text(view: RecordedView) -> str:
-    """Return the summary as plain text: as Markdown, a name in a recording could make the viewer fetch a picture."""
+    """Return the summary as plain text: as Markdown, a name in a recording could make the viewer fetch an image."""
     return "\n".join(_lines(view)) + "\n"
 
 

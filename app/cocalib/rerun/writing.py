@@ -26,7 +26,7 @@ class WrittenView:
     """What was written.
 
     Attributes:
-        frames: number of pictures.
+        frames: number of images.
         scans: number of radar scans.
         skipped: frames that are left out.
     """

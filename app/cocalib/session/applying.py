@@ -279,8 +279,8 @@ def _require_camera(intrinsics: ChosenIntrinsics, facts: RecordingFacts) -> None
         raise EventError(f"the intrinsics cannot be used: {error}; calibrate the lens again") from None
     if (camera.width_px, camera.height_px) != (facts.width_px, facts.height_px):
         raise EventError(
-            f"the intrinsics are for pictures of {camera.width_px} x {camera.height_px} px, but the frames have "
-            f"{facts.width_px} x {facts.height_px}; calibrate with pictures of that size"
+            f"the intrinsics are for images of {camera.width_px} x {camera.height_px} px, but the frames have "
+            f"{facts.width_px} x {facts.height_px}; calibrate with images of that size"
         )
 
 

@@ -10,7 +10,7 @@ from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs, time_parts
 
 _ROUNDED_NS = 1_000
-"""Names of pictures and many programs state microseconds: a click that is off by less names its frame all the same."""
+"""Names of images and many programs state microseconds: a click that is off by less names its frame all the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +75,8 @@ def _require_own_topic(
     for topic, times in others().items():
         if _all_at(clicks, times):
             raise InputError(
-                f"{source}: its clicks have the stamps of the frames of {topic}, which is not in use; choose these pictures with "
-                f"--image-topic {topic}, or give clicks in the pictures in use"
+                f"{source}: its clicks have the stamps of the frames of {topic}, which is not in use; choose these images with "
+                f"--image-topic {topic}, or give clicks in the images in use"
             )
 
 

@@ -25,7 +25,7 @@ class ChosenIntrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
     Attributes:
         about: where it comes from, such as "the board in this recording, 24 views".
         model: name of its lens model.
-        size_px: width and height of its pictures.
+        size_px: width and height of its images.
         matrix_px: K, row by row [px].
         distortion: coefficients in the lens model's order.
         order: names of the parameters that `covariance` is about; none if nobody said how well they are known.
@@ -111,14 +111,14 @@ class RecordingFacts:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
 
     @property
-    def has_pictures(self) -> bool:
+    def has_images(self) -> bool:
         """Whether there are frames to click in."""
         return len(self.image_times) > 0
 
     @property
     def moments(self) -> TimesNs:
         """The stamps (m,) that can be looked at [ns]: of the frames, or of the radar scans if there are no frames."""
-        return self.image_times if self.has_pictures else self.radar_times
+        return self.image_times if self.has_images else self.radar_times
 
     def unconfirmed(self, session: "Session") -> tuple[AssumedReading, ...]:
         """Return the assumptions that the user has not confirmed."""

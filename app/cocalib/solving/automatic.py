@@ -1,4 +1,4 @@
-"""Solve a recording without a person: clicks are placed where pictures and radar agree, or there is no calibration."""
+"""Solve a recording without a person: clicks are placed where images and radar agree, or there is no calibration."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -57,7 +57,7 @@ def place_clicks(
         options: of the calibration.
         confirmed: clicks that a person placed; they stay as they are.
         reflector_m: width of the reflector [m].
-        progress: called with what is done next, in words, and while the pictures are looked at.
+        progress: called with what is done next, in words, and while the images are looked at.
         stopped: asked often; once it is true there are no clicks.
 
     Raises:

@@ -29,7 +29,7 @@ def clicks_in_recording(
     """Return the clicks of a file at the frames of a recording, and which ones were moved to them or set aside.
 
     Raises:
-        InputError: the clicks are not of this recording, or one is outside its picture.
+        InputError: the clicks are not of this recording, or one is outside its image.
     """
     found = clicks_at_frames(clicks, recording.image_times, source=str(source), others=recording.other_image_times)
     _require_inside(found.clicks, camera, source=source)

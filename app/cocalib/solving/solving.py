@@ -236,12 +236,12 @@ def camera_for(recording: Recording, camera_file: CameraFile | None) -> Camera |
     """
     if camera_file is None:
         return recording.camera()
-    picture = recording.image_bytes(0)
-    camera = camera_file.camera(image_size_px=(picture.width_px, picture.height_px))
-    if (camera.width_px, camera.height_px) != (picture.width_px, picture.height_px):
+    image = recording.image_bytes(0)
+    camera = camera_file.camera(image_size_px=(image.width_px, image.height_px))
+    if (camera.width_px, camera.height_px) != (image.width_px, image.height_px):
         raise InputError(
             f"{camera_file.source}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
-            f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames, or "
+            f"{image.width_px} x {image.height_px} px; give the intrinsics of these frames, or "
             "--rescale-camera if they are the calibrated ones resized"
         )
     return camera
@@ -359,6 +359,6 @@ def required_camera(recording: Recording, camera_file: CameraFile | None) -> Cam
             f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
             "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
             + (f", such as --camera {near}" if near else "")
-            + "; or calibrate the lens from pictures of a board: cocalib intrinsics --help"
+            + "; or calibrate the lens from images of a board: cocalib intrinsics --help"
         )
     return camera

@@ -99,7 +99,7 @@ def view(
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
-        warnings=_warnings(calibration, verdict) if facts.has_pictures else (warning_row(DataWarning("no-camera")),),
+        warnings=_warnings(calibration, verdict) if facts.has_images else (warning_row(DataWarning("no-camera")),),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
         advice=advice_for(calibration, verdict) if calibration else None,

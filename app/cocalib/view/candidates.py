@@ -17,7 +17,7 @@ from cocalib.view.wording import position_words
 _FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom
 _BETTER = 0.5  # probability from which on another return is suggested
 _SAME_M = 0.02
-_MARGIN = 0.1  # of the picture's width
+_MARGIN = 0.1  # of the image's width
 
 
 @dataclass(frozen=True, slots=True)

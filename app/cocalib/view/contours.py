@@ -1,4 +1,4 @@
-"""Lines of equal uncertainty in the picture, with their labels: marching squares over an uncertainty map."""
+"""Lines of equal uncertainty in the image, with their labels: marching squares over an uncertainty map."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -72,7 +72,7 @@ def _contour_map(calibration: Calibration, distance_m: float, farthest_m: float)
         for line in contour_lines(found.columns_px, found.rows_px, found.semi_major_px, level)
     )
     words = (
-        f"A point {label} away appears within {plain(known.min(), 2)} px of its drawn place where the picture is surest, "
+        f"A point {label} away appears within {plain(known.min(), 2)} px of its drawn place where the image is surest, "
         f"and within {plain(known.max(), 2)} px at worst (95 %, pose only)."
     )
     if distance_m > farthest_m:

@@ -1,4 +1,4 @@
-"""The figures next to the picture, each with one sentence, how the camera is mounted, and the errors that all pairs share."""
+"""The figures next to the image, each with one sentence, how the camera is mounted, and the errors that all pairs share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,13 +60,13 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
-    """Return the camera's position and angles relative to the radar, with one standard deviation, and that in the picture.
+    """Return the camera's position and angles relative to the radar, with one standard deviation, and that in the image.
 
     For a radar without elevation only what the pairs determine; `assumed_figures` returns the rest.
     """
     figures = _mounting_figures(calibration)
     shown = figures if calibration.sees_elevation else tuple(one for one in figures if one.key in _FIRM)
-    return (*shown, *_picture_figures(calibration), *_radar_figures(calibration))
+    return (*shown, *_image_figures(calibration), *_radar_figures(calibration))
 
 
 def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -79,7 +79,7 @@ def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
 
 def firm_text(calibration: Calibration) -> str:
     """Return what a radar without elevation determines, in one line."""
-    figures = [one for one in pose_figures(calibration) if one.key in (*_FIRM, "picture")]
+    figures = [one for one in pose_figures(calibration) if one.key in (*_FIRM, "image")]
     return ", ".join(f"{one.label} {one.value} {one.unit}" for one in figures)
 
 
@@ -114,7 +114,7 @@ def _directed(what: tuple[str, str, str, str], value: float, sigma: float, unit:
     )
 
 
-def _picture_figures(calibration: Calibration) -> tuple[Figure, ...]:
+def _image_figures(calibration: Calibration) -> tuple[Figure, ...]:
     """Return how far off a reprojection may be, if that is known."""
     sigma_px = calibration.metrics.picture_sigma_px
     if not np.isfinite(sigma_px):
@@ -123,7 +123,7 @@ def _picture_figures(calibration: Calibration) -> tuple[Figure, ...]:
         "One standard deviation, per axis, of where a radar position at the placements reprojects. Errors of pose and radar "
         "mostly cancel there; the noise of a single radar position is not included."
     )
-    return (Figure("picture", "in the picture", f"± {plain(sigma_px, 2)}", "px", hint),)
+    return (Figure("image", "in the image", f"± {plain(sigma_px, 2)}", "px", hint),)
 
 
 def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:

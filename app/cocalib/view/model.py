@@ -64,7 +64,7 @@ class Ellipse(msgspec.Struct, frozen=True, array_like=True):
 
 @dataclass(frozen=True, slots=True)
 class ClickRow:
-    """One click: its mark on the picture and its row in the table.
+    """One click: its mark on the image and its row in the table.
 
     Attributes:
         id: the click's id.
@@ -248,7 +248,7 @@ class View:
         method: the one in the options.
         clicks: in order of image time.
         metrics: how well the pairs agree.
-        pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
+        pose: the camera's position and angles relative to the radar, and the uncertainty in the image.
         pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
         systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
         warnings: of the latest outcome, the gravest first.

@@ -76,7 +76,7 @@ def _pixels(at: PixelDifference) -> Figure:
         f"at {at.distance_m:g} m",
         f"{plain(at.rms_px)}",
         "px",
-        f"Distance in the picture between the two reprojections of a point {at.distance_m:g} m away: root mean square "
+        f"Distance in the image between the two reprojections of a point {at.distance_m:g} m away: root mean square "
         f"over the image, {plain(at.max_px)} px at most.{expected}",
         "warning" if known and at.rms_px > 3 * at.sigma_px else "plain",
     )

@@ -216,7 +216,7 @@ def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: boo
         score=plain(candidate.score, 2),
         snr=f"{candidate.snr_db:.0f} dB" if np.isfinite(candidate.snr_db) else "–",
         seen=f"{candidate.returns} in {candidate.scans}",
-        distance=f"{plain(distance_px)} px" if np.isfinite(distance_px) else "not in the picture",
+        distance=f"{plain(distance_px)} px" if np.isfinite(distance_px) else "not in the image",
         u_px=round(float(pixel[0]), 2) if seen else None,
         v_px=round(float(pixel[1]), 2) if seen else None,
     )

@@ -169,11 +169,11 @@ class CheckPointRow:
 
     Attributes:
         words: what must come out of a reader of the file.
-        u_px: column of its pixel in the picture as taken.
+        u_px: column of its pixel in the image as taken.
         v_px: row of it.
-        width_px: of that picture.
-        height_px: of that picture.
-        pair: id of the pair whose picture shows it; "" if none does.
+        width_px: of that image.
+        height_px: of that image.
+        pair: id of the pair whose image shows it; "" if none does.
     """
 
     words: str
@@ -200,9 +200,7 @@ def check_point_row(file: CalibrationFile, form: Format, read_back: ImportedCali
     camera_m = (file.calibration.camera_from_radar @ check.radar_m[None])[0]
     if form.is_for_rectified and camera.is_distorted:
         rectified = _pixel_words(_rectified_pixel(camera, read_back, camera_m))
-        words = (
-            f"{point} must project to {rectified} of the rectified picture, which is {pixel} of the picture as taken"
-        )
+        words = f"{point} must project to {rectified} of the rectified image, which is {pixel} of the image as taken"
     else:
         words = f"{point} must project to {pixel}"
     words += ": recompute it with your reader to test it."
@@ -219,7 +217,7 @@ def check_point_row(file: CalibrationFile, form: Format, read_back: ImportedCali
     )
 
 
-def picture_of(file: CalibrationFile) -> TimeNs | None:
+def image_of(file: CalibrationFile) -> TimeNs | None:
     """Return the stamp of the frame in which the check point was clicked; None if it is no pair's position."""
     pair = _pair_at(file)
     return next((one.image_time for one in file.calibration.pairs if one.id == pair), None)
@@ -237,7 +235,7 @@ def _rectified_pixel(camera: Camera, read_back: ImportedCalibration, camera_m: n
 
 
 def _pair_at(file: CalibrationFile) -> str | None:
-    """Return the id of the pair whose true position is the check point, if it was clicked in a picture."""
+    """Return the id of the pair whose true position is the check point, if it was clicked in an image."""
     pairs = [pair for pair in file.calibration.pairs if pair.inlier and pair.image_time is not None]
     if file.check_point is None or not pairs:
         return None
@@ -272,7 +270,7 @@ class Fields:
     Attributes:
         frames: the names to write.
         parent_from_radar: the radar's pose in a third frame; None for the radar as origin.
-        rectified: the pictures are rectified.
+        rectified: the images are rectified.
         raw: the pose is to fit radar data as reported.
     """
 
@@ -331,7 +329,7 @@ class FormatRow:
         group: the heading it stands under.
         also: other words to find it by.
         takes_parent: the radar can be posed in a third frame.
-        takes_rectified: the user may have to state that the pictures are rectified.
+        takes_rectified: the user may have to state that the images are rectified.
     """
 
     key: str

@@ -20,7 +20,7 @@ from cocalib.web.messages import FrameHeader
 Size = Literal["full", "half", "thumbnail", "rectified"]
 
 _HALF_ABOVE_PX = 2_500_000
-"""Pictures with more pixels than this are sent at half size while playing [px]."""
+"""Images with more pixels than this are sent at half size while playing [px]."""
 _THUMBNAIL_WIDTH_PX = 480
 _BUDGET_BYTES = 16 << 20
 """Enough for the frames read ahead and those just shown: the recording's file, which the system caches, has all the others."""
@@ -29,7 +29,7 @@ _PROXY_QUALITY, _THUMBNAIL_QUALITY, _RECTIFIED_QUALITY = 85, 80, 92
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One compressed picture.
+    """One compressed image.
 
     Attributes:
         header: what it is; the number of the request is set when it is sent.
@@ -161,12 +161,12 @@ def _retrieve(task: "asyncio.Task[Frame]") -> None:
 
 
 def _full(source: Recording, index: int) -> Frame:
-    picture = source.image_bytes(index)
-    return Frame(FrameHeader(index, 0, picture.width_px, picture.height_px, 1.0, picture.format), picture.data)
+    image = source.image_bytes(index)
+    return Frame(FrameHeader(index, 0, image.width_px, image.height_px, 1.0, image.format), image.data)
 
 
 def _half(source: Recording, index: int) -> Frame:
-    """Halve a large picture; return a small one as it is."""
+    """Halve a large image; return a small one as it is."""
     full = _full(source, index)
     if full.header.width_px * full.header.height_px <= _HALF_ABOVE_PX:
         return full
@@ -174,7 +174,7 @@ def _half(source: Recording, index: int) -> Frame:
 
 
 def _thumbnail(source: Recording, index: int) -> Frame:
-    """Shrink a picture for the frustum of the 3D view."""
+    """Shrink an image for the frustum of the 3D view."""
     import cv2
 
     full = _full(source, index)
@@ -200,7 +200,7 @@ def _decoded(data: bytes, shrink: int) -> np.ndarray:
     }
     pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags[shrink] | cv2.IMREAD_IGNORE_ORIENTATION)
     if pixels is None:
-        raise ValueError("the picture cannot be decoded")
+        raise ValueError("the image cannot be decoded")
     return np.asarray(pixels)
 
 
@@ -209,7 +209,7 @@ def _encoded(pixels: np.ndarray, quality: int) -> bytes:
 
     done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
-        raise ValueError("the picture cannot be encoded")
+        raise ValueError("the image cannot be encoded")
     return data.tobytes()
 
 
@@ -217,7 +217,7 @@ _MAKERS: dict[str, Callable[[Recording, int], Frame]] = {"full": _full, "half": 
 
 
 class _FrameRectifier:
-    """Rectifies pictures; the maps of one camera are kept. Every method may be called from any thread."""
+    """Rectifies images; the maps of one camera are kept. Every method may be called from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -225,10 +225,10 @@ class _FrameRectifier:
         self._maps: tuple[np.ndarray, np.ndarray] | None = None
 
     def rectified(self, pixels: np.ndarray, camera: Camera | None) -> np.ndarray:
-        """Return a picture (h, w, 3) rectified with the intrinsics of its camera; the same size.
+        """Return an image (h, w, 3) rectified with the intrinsics of its camera; the same size.
 
         Raises:
-            InputError: there are no intrinsics, they are for pictures of another size, or the lens cannot be rectified.
+            InputError: there are no intrinsics, they are for images of another size, or the lens cannot be rectified.
         """
         import cv2
 
@@ -236,7 +236,7 @@ class _FrameRectifier:
             raise InputError("there are no intrinsics to rectify it with; calibrate the lens in the menu under Lens")
         if pixels.shape[:2] != (camera.height_px, camera.width_px):
             raise InputError(
-                f"the intrinsics are for {camera.width_px} x {camera.height_px} px, and the picture has "
+                f"the intrinsics are for {camera.width_px} x {camera.height_px} px, and the image has "
                 f"{pixels.shape[1]} x {pixels.shape[0]}"
             )
         columns, rows = self._maps_of(camera)

@@ -84,7 +84,7 @@ class Returns:
         """Return them as they are sent to a page.
 
         Args:
-            pixels_px: (n, 2) where they are in the picture; NaN if they are not in it.
+            pixels_px: (n, 2) where they are in the image; NaN if they are not in it.
         """
         range_m, angles_deg = self.polar[:, :1], np.rad2deg(self.polar[:, 1:])
         before = np.column_stack([pixels_px, range_m, self.doppler_mps, self.snr_db]).round(3).tolist()
@@ -127,7 +127,7 @@ class Returns:
 
 
 def pixels_of(calibration: Calibration | None, points_m: Points3) -> Points2:
-    """Return where points (n, 3), without errors of the radar, are in the picture (n, 2); NaN if they are not in it."""
+    """Return where points (n, 3), without errors of the radar, are in the image (n, 2); NaN if they are not in it."""
     pixels = np.full((len(points_m), 2), np.nan)
     if calibration is not None and len(points_m):
         points_camera = calibration.camera_from_radar @ points_m
@@ -173,7 +173,7 @@ def overlay_of(
 
 
 def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) -> tuple[RadarReturn, ...]:
-    """Return the returns of a scan that are in the picture."""
+    """Return the returns of a scan that are in the image."""
     returns = Returns.of_scan(scan, options, calibration.radar_errors.corrected)
     pixels = pixels_of(calibration, returns.points_m)
     seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
@@ -181,7 +181,7 @@ def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) 
 
 
 _MOST_UNSURE = 1 / 12
-"""Nothing is expected where its standard deviation is above this part of the picture's width: the page zooms in there."""
+"""Nothing is expected where its standard deviation is above this part of the image's width: the page zooms in there."""
 
 
 def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[OverlayGuess, ...]:

@@ -156,4 +156,4 @@ cm. No answer is better than a wrong one, and never counts. `c` is the share who
 ellipsoid. In the second table another pose explains the pairs as well, so that at most a measured camera position, here
 right to 2 cm, can show the defect: these rows count for nothing above, and the assumption that the verdict states does not
 count as naming. A sheared array, whose elevations take up a share of the azimuths, is a roll to placements on the ground; 2 deg
-of it, and a picture cropped after its intrinsics were measured, are a turn, which a camera position does not show either."""
+of it, and an image cropped after its intrinsics were measured, are a turn, which a camera position does not show either."""

@@ -312,7 +312,7 @@ _GAUGES = (
     *_gauge("the stand's head clicked, 30 cm up", "head", SystematicErrors(reflector_offset_m=(0.0, -0.3, 0.0))),
     *_gauge("the person clicked, 40 cm aside", "person", SystematicErrors(reflector_offset_m=(0.4, 0.0, 0.0))),
     *_gauge("elevations pulled to the ground, 40 cm", "ground", SystematicErrors(), _lower),
-    *_gauge("picture cropped by 200 rows", "cropped", SystematicErrors(principal_point_px=(0.0, 200.0))),
+    *_gauge("image cropped by 200 rows", "cropped", SystematicErrors(principal_point_px=(0.0, 200.0))),
     *_gauge("array sheared by 2 deg", "shear", SystematicErrors(), _sheared(2.0)),
 )
 ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT, *_GAUGES)

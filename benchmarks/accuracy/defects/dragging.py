@@ -1,4 +1,4 @@
-"""One click is dragged across the picture: does the pose follow without jumps?"""
+"""One click is dragged across the image: does the pose follow without jumps?"""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -25,7 +25,7 @@ class FileFrame:
         boxes: in our pixels: (0, 0) is the centre of the top-left pixel.
         stamp: that the file states for the frame; None if it states none.
         number: that the file states for the frame; None if it states none.
-        name: of the picture, without folder and suffix; "" if the file names none.
+        name: of the image, without folder and suffix; "" if the file names none.
     """
 
     boxes: tuple[Box, ...]
@@ -40,7 +40,7 @@ class FileBoxes:
 
     Attributes:
         frames: in the file's order; none may be annotated twice.
-        image_size_px: width and height of the pictures; None if the file does not state it.
+        image_size_px: width and height of the images; None if the file does not state it.
         first_number: of the first frame of the sequence, if the format defines it; None if files differ.
         frame_count: how many frames the annotated sequence has; None if the file does not state it.
         notes: what reading took for granted, as sentences without their final periods.
@@ -63,7 +63,7 @@ class BoxFile:
         root: of XML; None for anything else.
         members: the text files of a folder or archive, or a single text file, by their path with forward slashes.
         tables: the folder whose members are left to be read row by row, their texts here empty; None if these are whole.
-        image_size_px: width and height of the recorded pictures, for formats that count in shares of them; None if unknown.
+        image_size_px: width and height of the recorded images, for formats that count in shares of them; None if unknown.
         image_names: of the recorded frames' files without suffix, for sets of several cameras; none if they are not files.
     """
 
@@ -251,7 +251,7 @@ def cuboid_box(
     label: str,
     track: str,
 ) -> Box | None:
-    """Make the box around a cuboid in an undistorted picture; None if it is not in it, or reaches behind the camera.
+    """Make the box around a cuboid in an undistorted image; None if it is not in it, or reaches behind the camera.
 
     Args:
         camera_from_object: of its middle; its x is along its length.

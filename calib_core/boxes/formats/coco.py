@@ -1,4 +1,4 @@
-"""COCO JSON: a data set with images, annotations and categories, or a list of detections; xywh from the picture's corner."""
+"""COCO JSON: a data set with images, annotations and categories, or a list of detections; xywh from the image's corner."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
@@ -31,11 +31,11 @@ def _read(file: BoxFile) -> FileBoxes:
 
 
 def _detections(found: Sequence[Any], source: str) -> FileBoxes:
-    """Read a list of detections: pictures by their id, which is a number or the picture's name."""
+    """Read a list of detections: images by their id, which is a number or the image's name."""
     boxes: dict[Any, list[Box]] = {}
     for at, one in enumerate(found):
         place = f"{source}: [{at}]"
-        boxes.setdefault(_picture_of(one, place), []).append(_box(_mapping(one, place), {}, place))
+        boxes.setdefault(_image_of(one, place), []).append(_box(_mapping(one, place), {}, place))
     frames = [
         FileFrame(tuple(boxes[key]), number=key) if isinstance(key, int) else FileFrame(tuple(boxes[key]), name=key)
         for key in boxes
@@ -44,7 +44,7 @@ def _detections(found: Sequence[Any], source: str) -> FileBoxes:
     return FileBoxes(tuple(frames), notes=(note,))
 
 
-def _picture_of(one: Any, place: str) -> int | str:
+def _image_of(one: Any, place: str) -> int | str:
     key = _mapping(one, place).get("image_id")
     return _stem(key) if isinstance(key, str) else whole_number(key, f"{place}.image_id")
 
@@ -99,7 +99,7 @@ def _box(one: Mapping[str, Any], labels: Mapping[str, str], place: str) -> Box:
 
 
 def _frame(image: Mapping[str, Any], boxes: tuple[Box, ...], place: str) -> FileFrame:
-    """Identify a picture by its frame_id, else by its name, else by its id."""
+    """Identify an image by its frame_id, else by its name, else by its id."""
     name = _stem(str(image.get("file_name", "")))
     number = image.get("frame_id")
     if number is None and not any(letter.isdecimal() for letter in name):

@@ -1,4 +1,4 @@
-"""CVAT XML 1.1: for images, boxes by picture; for video, tracks whose boxes are given at keyframes and interpolated."""
+"""CVAT XML 1.1: for images, boxes by image; for video, tracks whose boxes are given at keyframes and interpolated."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -127,7 +127,7 @@ def _video(root: Element, source: str) -> FileBoxes:
 
 
 def _keyframes(track: Element, source: str) -> dict[int, Box | None]:
-    """Return a track's boxes by frame, None where the object leaves the picture."""
+    """Return a track's boxes by frame, None where the object leaves the image."""
     name, label = track.get("id", ""), track.get("label", "")
     keys: dict[int, Box | None] = {}
     for element in track.findall("box"):

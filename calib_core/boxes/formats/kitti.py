@@ -1,4 +1,4 @@
-"""KITTI: label_02/NNNN.txt of the tracking benchmark, or a folder label_2 with one file per picture.
+"""KITTI: label_02/NNNN.txt of the tracking benchmark, or a folder label_2 with one file per image.
 
 Its boxes are pixel indices counted from 0, so they are ours without a shift. Regions marked DontCare are left out. A cuboid is
 height, width, length, the middle of its floor in the camera's axes, and the turn about y that takes the camera's x to its length.

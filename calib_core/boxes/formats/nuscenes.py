@@ -1,7 +1,7 @@
 """nuScenes: the tables of one version, such as v1.0-mini, with a cuboid for each object of a keyframe.
 
-A cuboid is in the axes of the map; the vehicle's and the camera's poses of a picture carry it there. Pictures are undistorted.
-Tables of the whole set have up to 1 GB: they are read row by row, and only what belongs to recorded pictures is kept.
+A cuboid is in the axes of the map; the vehicle's and the camera's poses of an image carry it there. Images are undistorted.
+Tables of the whole set have up to 1 GB: they are read row by row, and only what belongs to recorded images is kept.
 """
 
 from collections import Counter
@@ -48,8 +48,8 @@ def _read(file: BoxFile) -> FileBoxes:
     shown = _table(file, "sample_data", is_shown).values()
     if not shown:
         raise InputError(
-            f"{file.source}: none of its {seen.total()} pictures of keyframes is a recorded frame; open the set's own "
-            "pictures, such as samples/CAM_FRONT"
+            f"{file.source}: none of its {seen.total()} images of keyframes is a recorded frame; open the set's own "
+            "images, such as samples/CAM_FRONT"
         )
     samples = {str(row.get("sample_token")) for row in shown}
     of_sample: dict[Any, list[_Row]] = {}
@@ -59,17 +59,17 @@ def _read(file: BoxFile) -> FileBoxes:
     tables = {name: _table(file, name, lambda _: True) for name in ("calibrated_sensor", "instance", "category")}
     tables["ego_pose"] = _table(file, "ego_pose", lambda row: row["token"] in poses)
     frames, sizes = [], set()
-    for picture in shown:
-        place = f"{file.source}: sample_data {picture.get('token')}"
-        size = (whole_number(picture["width"], place), whole_number(picture.get("height"), place))
-        sensor = _row(tables, "calibrated_sensor", picture.get("calibrated_sensor_token"), place)
-        vehicle = _row(tables, "ego_pose", picture.get("ego_pose_token"), place)
+    for image in shown:
+        place = f"{file.source}: sample_data {image.get('token')}"
+        size = (whole_number(image["width"], place), whole_number(image.get("height"), place))
+        sensor = _row(tables, "calibrated_sensor", image.get("calibrated_sensor_token"), place)
+        vehicle = _row(tables, "ego_pose", image.get("ego_pose_token"), place)
         camera_from_map = (_pose(vehicle, place) @ _pose(sensor, place)).inverse()
         lens = sensor.get("camera_intrinsic")
         rows = lens if isinstance(lens, list) and len(lens) == 3 else [[]]
         matrix_px = np.array([numbers(row, 3, f"{place}: camera_intrinsic") for row in rows])
         boxes = []
-        for found in of_sample.get(picture.get("sample_token"), ()):
+        for found in of_sample.get(image.get("sample_token"), ()):
             where = f"{file.source}: {ANNOTATIONS} {found.get('token')}"
             width_m, length_m, height_m = numbers(found.get("size"), 3, f"{where}: size")
             instance = _row(tables, "instance", found.get("instance_token"), where)
@@ -79,14 +79,14 @@ def _read(file: BoxFile) -> FileBoxes:
             boxes.append(
                 cuboid_box(camera_from_object, (length_m, width_m, height_m), matrix_px, size, label=label, track=name)
             )
-        stamp = TimeNs(1000 * whole_number(picture.get("timestamp"), f"{place}: timestamp", most=1e18))
-        frames.append(FileFrame(tuple(box for box in boxes if box), stamp=stamp, name=_stem(picture)))
+        stamp = TimeNs(1000 * whole_number(image.get("timestamp"), f"{place}: timestamp", most=1e18))
+        frames.append(FileFrame(tuple(box for box in boxes if box), stamp=stamp, name=_stem(image)))
         sizes.add(size)
     return FileBoxes(tuple(frames), image_size_px=next(iter(sizes)) if len(sizes) == 1 else None)
 
 
-def _stem(picture: _Row) -> str:
-    return PurePosixPath(str(picture.get("filename"))).stem
+def _stem(image: _Row) -> str:
+    return PurePosixPath(str(image.get("filename"))).stem
 
 
 def _table(file: BoxFile, name: str, wanted: Callable[[_Row], bool]) -> dict[str, _Row]:

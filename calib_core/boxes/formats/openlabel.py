@@ -75,7 +75,7 @@ def _read(file: BoxFile) -> FileBoxes:
                 )
             else:
                 boxes += [box for _, box in own]
-        frames.append(FileFrame(tuple(boxes), _stamp(frame, place), whole_number(number, place), _picture(frame)))
+        frames.append(FileFrame(tuple(boxes), _stamp(frame, place), whole_number(number, place), _image(frame)))
     if len(cameras) > 1:
         raise InputError(
             f"{file.source}: has the boxes of {len(cameras)} cameras ({', '.join(sorted(cameras)[:5])}); export one camera's"
@@ -115,7 +115,7 @@ def _with_cuboid(
     """Return the rectangles of an object with its cuboid, or the one around the cuboid; as they are if nothing says where it is.
 
     Raises:
-        InputError: there is no rectangle, and nothing says where the cuboid is in the picture.
+        InputError: there is no rectangle, and nothing says where the cuboid is in the image.
     """
     values = entry.get("val")
     if not isinstance(values, list) or len(values) not in (9, 10):
@@ -128,7 +128,7 @@ def _with_cuboid(
             return own
         raise InputError(
             f"{place}: has a cuboid and no bbox, and the file does not state the poses in this frame of the coordinate systems "
-            f"{str(system)!r} and of one camera with a pinhole lens; export them, or the rectangles of the picture (bbox)"
+            f"{str(system)!r} and of one camera with a pinhole lens; export them, or the rectangles of the image (bbox)"
         )
     turn = where[3:-3]
     rotation = np.array([turn[3], *turn[:3]]) if len(turn) == 4 else rotation_from_euler(*turn)
@@ -241,7 +241,7 @@ def _streams(frame: Any) -> Mapping[str, Any]:
     return _part(_part(frame, "frame_properties"), "streams")
 
 
-def _picture(frame: Any) -> str:
+def _image(frame: Any) -> str:
     uri = next(
         (stream["uri"] for stream in _streams(frame).values() if isinstance(stream, dict) and "uri" in stream), ""
     )

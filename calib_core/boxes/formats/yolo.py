@@ -1,4 +1,4 @@
-"""YOLO: a folder with one text file per picture; class, centre and size as shares of the picture, perhaps score and track."""
+"""YOLO: a folder with one text file per image; class, centre and size as shares of the image, perhaps score and track."""
 
 import re
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ def _recognizes(file: BoxFile) -> bool:
 
 
 def _frames_of(file: BoxFile) -> list[tuple[str, str]]:
-    """Return the name and text of each picture's file."""
+    """Return the name and text of each image's file."""
     return [
         (name, text)
         for name, text in file.members.items()
@@ -41,7 +41,7 @@ def _frames_of(file: BoxFile) -> list[tuple[str, str]]:
 def _read(file: BoxFile) -> FileBoxes:
     if file.image_size_px is None:
         raise InputError(
-            f"{file.source}: counts in shares of a picture whose size is unknown; give the camera's recording"
+            f"{file.source}: counts in shares of an image whose size is unknown; give the camera's recording"
         )
     labels = _labels(file.members, file.source)
     frames = []
@@ -101,4 +101,4 @@ def _box(row: list[str], labels: Mapping[str, str], size_px: tuple[int, int], pl
     )
 
 
-YOLO = BoxFormat("YOLO (one text file per picture)", _recognizes, _read)
+YOLO = BoxFormat("YOLO (one text file per image)", _recognizes, _read)

@@ -12,13 +12,13 @@ from calib_core.lens_models.registry import LENS_MODELS, lenses_named, opencv_le
 
 
 @dataclass(frozen=True, slots=True)
-class PictureWindow:
+class ImageWindow:
     """The part of the sensor that was published, and how it was binned (REP 104).
 
     Attributes:
         offset_px: left column and upper row of the region of interest, on the full sensor.
         size_px: its width and height on the full sensor; None for all of it.
-        binning: pixels of the sensor along a row and a column that make one of the picture.
+        binning: pixels of the sensor along a row and a column that make one of the image.
     """
 
     offset_px: tuple[int, int] = (0, 0)
@@ -37,7 +37,7 @@ class FoundCamera:
         distortion: the coefficients, as many as the file has.
         size_px: width and height; None if the file does not state them.
         covariance: of the parameters; None if the file does not state it.
-        window: the part of the picture that was recorded; None for all of it.
+        window: the part of the image that was recorded; None for all of it.
         refused: why this camera cannot be used, if others of the file may be; "" if it can.
     """
 
@@ -47,11 +47,11 @@ class FoundCamera:
     distortion: tuple[float, ...]
     size_px: tuple[int, int] | None
     covariance: CameraCovariance | None = None
-    window: PictureWindow | None = None
+    window: ImageWindow | None = None
     refused: str = ""
 
     def camera(self, *, image_size_px: tuple[int, int] | None, source: str) -> Camera:
-        """Return the camera, for the pictures as they were recorded.
+        """Return the camera, for the images as they were recorded.
 
         Raises:
             InputError: the camera is refused, the image size is missing, or a parameter is invalid.
@@ -100,7 +100,7 @@ class FoundCamera:
 
 
 _OFF_CENTRE = 0.1
-"""How far off its middle, as a share of the picture, a principal point shows that the picture had another size."""
+"""How far off its middle, as a share of the image, a principal point shows that the image had another size."""
 _ALIKE = 0.06
 
 
@@ -109,17 +109,17 @@ def refuse_another_size(matrix_px: np.ndarray, size_px: tuple[int, int], where: 
 
     Args:
         matrix_px: (3, 3), from a file that states no size.
-        size_px: width and height of the pictures it is to be used for.
+        size_px: width and height of the images it is to be used for.
         where: the start of the message.
 
     Raises:
-        InputError: it is, so the lens was calibrated in pictures of another size.
+        InputError: it is, so the lens was calibrated in images of another size.
     """
     across, down = (matrix_px[:2, 2] + 0.5) / size_px
     if min(abs(across - 0.5), abs(down - 0.5)) > _OFF_CENTRE and abs(across - down) < _ALIKE:
         scale = across + down
         raise InputError(
-            f"{where}: the principal point ({matrix_px[0, 2]:.0f}, {matrix_px[1, 2]:.0f}) is that of pictures of about "
+            f"{where}: the principal point ({matrix_px[0, 2]:.0f}, {matrix_px[1, 2]:.0f}) is that of images of about "
             f"{scale * size_px[0]:.0f} x {scale * size_px[1]:.0f} px, but these have {size_px[0]} x {size_px[1]} px; state in "
             "the file which size it was calibrated for (image_width, image_height)"
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib_core.camera import CameraCovariance
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import FoundCamera, PictureWindow, found_or_refused
+from calib_core.interchange.cameras.camera_format import FoundCamera, ImageWindow, found_or_refused
 from calib_core.interchange.own.documents import CameraDocument, camera_of
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.lens_models.registry import LENS_MODELS
@@ -135,17 +135,17 @@ def _kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundC
     )
 
 
-def _window(content: Mapping[str, Any], *, source: str) -> PictureWindow | None:
+def _window(content: Mapping[str, Any], *, source: str) -> ImageWindow | None:
     """Return the part of the sensor that was published, for K of the full one (REP 104); None for all of it."""
     roi = content.get("roi") if isinstance(content.get("roi"), Mapping) else {}
     numbers = [_count(roi, key, source=source) for key in ("x_offset", "y_offset", "width", "height")]
     binning = tuple(max(1, _count(content, key, source=source)) for key in ("binning_x", "binning_y"))
     x, y, width, height = numbers
     if bool(width) != bool(height):
-        raise InputError(f"{source}: roi: width {width} and height {height}: state both, or 0 for the whole picture")
+        raise InputError(f"{source}: roi: width {width} and height {height}: state both, or 0 for the whole image")
     if not any(numbers) and binning == (1, 1):
         return None
-    return PictureWindow((x, y), (width, height) if width else None, (binning[0], binning[1]))
+    return ImageWindow((x, y), (width, height) if width else None, (binning[0], binning[1]))
 
 
 def _count(content: Any, key: str, *, source: str) -> int:

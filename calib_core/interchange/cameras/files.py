@@ -56,7 +56,7 @@ class CameraFile:
         source: its path or name, for error messages.
         data: its content.
         name: which of its cameras; None if it has one.
-        rescale: whether to scale it to pictures that are the calibrated ones resized.
+        rescale: whether to scale it to images that are the calibrated ones resized.
     """
 
     source: str
@@ -70,7 +70,7 @@ class CameraFile:
 
         Args:
             path: of the file.
-            rescale: whether to scale the camera to pictures that are the calibrated ones resized.
+            rescale: whether to scale the camera to images that are the calibrated ones resized.
 
         Raises:
             InputError: it cannot be read.
@@ -103,7 +103,7 @@ class CameraFile:
         return self._rescaled(camera, image_size_px) if self.rescale and image_size_px else camera
 
     def _rescaled(self, camera: Camera, size_px: tuple[int, int]) -> Camera:
-        """Return the camera for pictures of another size, if they can be the same ones, resized.
+        """Return the camera for images of another size, if they can be the same ones, resized.
 
         Raises:
             InputError: their aspect ratio differs.
@@ -111,7 +111,7 @@ class CameraFile:
         width, height = size_px
         if abs(camera.width_px * height - camera.height_px * width) > max(camera.width_px, camera.height_px):
             raise InputError(
-                f"{self.source}: calibrated for {camera.width_px} x {camera.height_px} px; pictures of {width} x {height} px are "
+                f"{self.source}: calibrated for {camera.width_px} x {camera.height_px} px; images of {width} x {height} px are "
                 "not the same ones resized (another aspect ratio): calibrate the camera at this size"
             )
         scaled = camera.scaled(width / camera.width_px)

@@ -1,4 +1,4 @@
-"""KITTI's calib_cam_to_cam.txt: K, D and size of each camera, and its rectified picture."""
+"""KITTI's calib_cam_to_cam.txt: K, D and size of each camera, and its rectified image."""
 
 import re
 

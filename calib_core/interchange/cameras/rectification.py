@@ -1,4 +1,4 @@
-"""Rectified pictures of a distorted lens: their camera matrix, and the maps that make them."""
+"""Rectified images of a distorted lens: their camera matrix, and the maps that make them."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,7 +15,7 @@ from calib_core.interchange.syntax.zip_archives import pack_arrays
 from calib_core.results import CheckPoint
 
 _WIDEST = np.tan(np.radians(75.0))
-"""A rectified picture ends 75 degrees off the axis at the latest; beyond, a fisheye's pixels would be stretched without end."""
+"""A rectified image ends 75 degrees off the axis at the latest; beyond, a fisheye's pixels would be stretched without end."""
 _BLOCK_ROWS = 64
 _SHRINKING_STEPS = 40
 _SMALLEST = 0.05
@@ -23,7 +23,7 @@ _SMALLEST = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RectificationMaps:
-    """Where each pixel of the rectified picture is in the picture as taken, as cv2.remap takes it.
+    """Where each pixel of the rectified image is in the image as taken, as cv2.remap takes it.
 
     Attributes:
         x_px: (height, width) columns, 32-bit.
@@ -39,7 +39,7 @@ class RectificationMaps:
 
 
 def rectified_camera(camera: Camera) -> Camera:
-    """Return the pinhole camera whose picture, of the same size, is the largest without empty borders.
+    """Return the pinhole camera whose image, of the same size, is the largest without empty borders.
 
     That is OpenCV's getOptimalNewCameraMatrix with alpha 0, for every lens model, and checked against the lens.
 
@@ -56,7 +56,7 @@ def rectified_camera(camera: Camera) -> Camera:
         share = seen
     if share < _SMALLEST:
         raise InputError(
-            "no rectified picture can be cut from this lens: its distortion folds back near the centre; calibrate it again"
+            "no rectified image can be cut from this lens: its distortion folds back near the centre; calibrate it again"
         )
     low, high = low * share, high * share
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
@@ -67,10 +67,10 @@ def rectified_camera(camera: Camera) -> Camera:
 
 
 def rectification_maps(camera: Camera, rectified: Camera) -> RectificationMaps:
-    """Return where each pixel of the rectified picture is in the picture as taken.
+    """Return where each pixel of the rectified image is in the image as taken.
 
     Args:
-        camera: as it takes pictures.
+        camera: as it takes images.
         rectified: what `rectified_camera` returned for it.
     """
     maps = np.empty((2, rectified.height_px, rectified.width_px), dtype=np.float32)
@@ -85,7 +85,7 @@ def rectification_maps(camera: Camera, rectified: Camera) -> RectificationMaps:
 
 
 def rectified_file(file: CalibrationFile, rectified: Camera) -> CalibrationFile:
-    """Return a calibration for rectified pictures: the pinhole camera, the check point in it, and the hash of the original."""
+    """Return a calibration for rectified images: the pinhole camera, the check point in it, and the hash of the original."""
     calibration = replace(file.calibration, camera=rectified)
     check = file.check_point
     if check is not None:
@@ -101,7 +101,7 @@ def rectified_file(file: CalibrationFile, rectified: Camera) -> CalibrationFile:
 
 
 def maps_npz(camera: Camera, rectified: Camera) -> bytes:
-    """Return the maps as npz: picture_rectified = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR)."""
+    """Return the maps as npz: image_rectified = cv2.remap(image, map_x, map_y, cv2.INTER_LINEAR)."""
     maps = rectification_maps(camera, rectified)
     return pack_arrays(
         {
@@ -112,13 +112,13 @@ def maps_npz(camera: Camera, rectified: Camera) -> bytes:
             "K": camera.matrix_px,
             "D": camera.distortion,
             "camera_model": np.array(camera.model),
-            "usage": np.array("rectified = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR)"),
+            "usage": np.array("rectified = cv2.remap(image, map_x, map_y, cv2.INTER_LINEAR)"),
         }
     )
 
 
 def _inner_rectangle(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (x, y) on the plane z = 1 of the largest rectangle that no edge of the picture cuts into."""
+    """Return the corners (x, y) on the plane z = 1 of the largest rectangle that no edge of the image cuts into."""
     columns, rows = np.arange(camera.width_px, dtype=np.float64), np.arange(camera.height_px, dtype=np.float64)
     left = _on_plane(camera, np.column_stack([0.0 * rows, rows]))[:, 0]
     right = _on_plane(camera, np.column_stack([0.0 * rows + columns[-1], rows]))[:, 0]

@@ -244,7 +244,7 @@ class AgreementLimits:
     Attributes:
         max_deg: between the rotations.
         max_cm: between the camera positions.
-        max_px: root mean square over the picture, at each of 5, 20 and 60 m, and by the lens alone.
+        max_px: root mean square over the image, at each of 5, 20 and 60 m, and by the lens alone.
         max_sigma: of the difference under the covariances, in standard deviations of one normal variable.
 
     Raises:
@@ -490,7 +490,7 @@ def _lens_checks(comparison: Comparison, judgement: Judgement) -> list[CheckResu
     by_how_much = "" if np.isnan(lens.rms_px) else f", {shown(lens.rms_px)} px rms by the lens alone"
     message = f"the two have different intrinsics{by_how_much}: {lens.text}"
     if comparison.lens_note:
-        hint = f"{comparison.lens_note}; right only for pictures undistorted with this very matrix"
+        hint = f"{comparison.lens_note}; right only for images undistorted with this very matrix"
         return [CheckResult("warning", "other-lens", message, hint)]
     beyond = not all(one.met for one in judgement.criteria if one.name == "lens_px")
     hint = "use one camera's intrinsics in both, or compare calibrations of one camera"

@@ -1,4 +1,4 @@
-"""The distance in the picture between two calibrations, each through its own lens; the lens and the pose apart."""
+"""The distance in the image between two calibrations, each through its own lens; the lens and the pose apart."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.interchange.format import ImportedCalibration
 
 DISTANCES_M = (5.0, 20.0, 60.0)
-LOST_TEXT = "behind the camera or far outside the picture"
+LOST_TEXT = "behind the camera or far outside the image"
 """What is said instead of a distance in pixels that means nothing."""
 _GRID = 7
 _SAME_LENS_PX = 0.05
@@ -29,7 +29,7 @@ class PixelDifference:
         max_px: maximum over the image.
         sigma_px: root mean square of the pose's part that the two covariances predict; NaN if neither is known.
         pose_rms_px: the part of the pose: root mean square with one lens for both.
-        lost_share: share of the image that the other one does not project into or near its picture.
+        lost_share: share of the image that the other one does not project into or near its image.
     """
 
     distance_m: float
@@ -45,7 +45,7 @@ class LensDifference:
     """How far apart two lenses project the same rays.
 
     Attributes:
-        rms_px: root mean square over the image; NaN if the pictures have different sizes.
+        rms_px: root mean square over the image; NaN if the images have different sizes.
         max_px: maximum over the image.
         text: which numbers of the two cameras differ.
     """
@@ -66,7 +66,7 @@ class Lenses:
 
     Attributes:
         first: of the first side.
-        second: of the second; that of the first if it has none, or one of another picture size.
+        second: of the second; that of the first if it has none, or one of another image size.
         difference: between the lenses that the sides state; None if one states none.
         note: what is compared, if that is not the two lenses as stated; else "".
     """
@@ -80,8 +80,8 @@ class Lenses:
 def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | None) -> Lenses | None:
     """Return the lenses of two calibrations; one that states none is seen through the other's. None if nothing is known.
 
-    A file that states only the matrix of undistorted pictures is compared in such pictures: with the same matrix, or with that
-    of the rectified pictures of our exports.
+    A file that states only the matrix of undistorted images is compared in such images: with the same matrix, or with that
+    of the rectified images of our exports.
 
     Args:
         a: the first.
@@ -99,9 +99,7 @@ def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | N
     note = ""
     if (a.camera is None or b.camera is None) and (of_a.is_distorted or of_b.is_distorted):
         of_a, of_b = _undistorted(of_a, of_b), _undistorted(of_b, of_a)
-        note = (
-            "one of the two states only the matrix of undistorted pictures, so the lens is compared without distortion"
-        )
+        note = "one of the two states only the matrix of undistorted images, so the lens is compared without distortion"
     difference = _lens_difference(of_a, of_b)
     return Lenses(of_a, of_a if np.isnan(difference.rms_px) else of_b, difference, note)
 
@@ -114,11 +112,11 @@ def _stated(side: ImportedCalibration, size_px: tuple[int, int]) -> Camera | Non
 
 
 def _undistorted(camera: Camera, other: Camera) -> Camera:
-    """Return the camera of undistorted pictures: with its own matrix, or our exports', whichever is nearer to the other's."""
+    """Return the camera of undistorted images: with its own matrix, or our exports', whichever is nearer to the other's."""
     same = Camera("pinhole", camera.width_px, camera.height_px, camera.matrix_px)
     try:
         ours = rectified_camera(camera) if camera.is_distorted else same
-    except InputError:  # no picture can be cut from this lens
+    except InputError:  # no image can be cut from this lens
         return same
     return min(same, ours, key=lambda one: float(np.abs(one.matrix_px - other.matrix_px).max()))
 
@@ -127,7 +125,7 @@ def _lens_difference(first: Camera, second: Camera) -> LensDifference:
     sizes = [(camera.width_px, camera.height_px) for camera in (first, second)]
     if sizes[0] != sizes[1]:
         (a, b), (c, d) = sizes
-        return LensDifference(float("nan"), float("nan"), f"pictures of {a} x {b} px and of {c} x {d} px")
+        return LensDifference(float("nan"), float("nan"), f"images of {a} x {b} px and of {c} x {d} px")
     pixels, rays = _grid(first)
     apart, lost = _apart(second, rays, pixels)
     rms_px, max_px = _rms_and_max(apart, lost)
@@ -215,7 +213,7 @@ def _apart(camera: Camera, points_camera_m: Points3, pixels: Points2) -> tuple[V
 
 
 def far_outside(apart_px: Values, camera: Camera) -> Flags:
-    """Return which distances (n,) from a pixel in the picture are of points behind the camera, or nearly beside it."""
+    """Return which distances (n,) from a pixel in the image are of points behind the camera, or nearly beside it."""
     with np.errstate(invalid="ignore"):
         return np.asarray(~(apart_px <= _FAR_OUTSIDE * np.hypot(camera.width_px, camera.height_px)))
 
@@ -230,7 +228,7 @@ def pixels_text(at: PixelDifference) -> str:
     """Return a difference at one distance in words."""
     if np.isinf(at.rms_px):
         return LOST_TEXT
-    lost = f", {at.lost_share:.0%} of the picture {LOST_TEXT}" if at.lost_share else ""
+    lost = f", {at.lost_share:.0%} of the image {LOST_TEXT}" if at.lost_share else ""
     return f"{shown(at.rms_px)} px rms, {shown(at.max_px)} px max{lost}"
 
 

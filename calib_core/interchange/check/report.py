@@ -206,7 +206,7 @@ def _as_reported(other: ImportedCalibration) -> ImportedCalibration:
 
 
 def _own_camera(imported: ImportedCalibration) -> Camera | None:
-    """Return the file's camera; that of rectified pictures has no size in the files, and needs none to project a point."""
+    """Return the file's camera; that of rectified images has no size in the files, and needs none to project a point."""
     if imported.camera is not None or imported.check_point is None or imported.check_point.rectified_px is None:
         return imported.camera
     try:
@@ -278,14 +278,14 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
         )
     lean = _lean(camera_from_radar)
     if off <= _SIDEWAYS_RAD and lean > _SIDEWAYS_RAD and not verified:
-        message = f"the picture leans {np.degrees(lean):.0f} deg to one side"
+        message = f"the image leans {np.degrees(lean):.0f} deg to one side"
         hint = "if the camera is not mounted like that, perhaps its frame has other axes: optical (z forward) or body (x forward)"
         results.append(CheckResult("warning", "on-its-side", message, hint))
     return results
 
 
 def _lean(camera_from_radar: RigidTransform) -> float:
-    """Return how far the radar's up axis leans to one side in the picture [rad]; 0 where it is seen from its end."""
+    """Return how far the radar's up axis leans to one side in the image [rad]; 0 where it is seen from its end."""
     right, down = camera_from_radar.rotation[0, 2], camera_from_radar.rotation[1, 2]
     return abs(float(np.arctan2(right, -down))) if np.hypot(right, down) > _SEEN else 0.0
 
@@ -475,7 +475,7 @@ def _by_lens(lenses: Lenses) -> CheckResult:
     message = f"the intrinsics are not that calibration's{by_how_much}: {lens.text}"
     if lenses.note:
         return CheckResult(
-            "warning", "other-lens", message, f"{lenses.note}; right only for pictures undistorted with it"
+            "warning", "other-lens", message, f"{lenses.note}; right only for images undistorted with it"
         )
     return CheckResult("error", "other-lens", message, "export it again, or put back the intrinsics")
 

@@ -15,7 +15,7 @@ from calib_core.interchange.syntax.content import Content
 
 _CAMERAS = "calib_cam_to_cam.txt"
 _AS_RADAR = "the Velodyne's frame is taken to be the radar's; KITTI has no radar"
-_UNDISTORTED = "assumed that the pictures are undistorted, those of image_02"
+_UNDISTORTED = "assumed that the images are undistorted, those of image_02"
 _ROUNDING = 1e-3
 
 

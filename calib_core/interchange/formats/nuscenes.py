@@ -43,7 +43,7 @@ def _write_in_ego(file: CalibrationFile, ego_from_radar: RigidTransform) -> byte
     ego_from_camera = ego_from_radar @ calibration.camera_from_radar.inverse()
     meaning = (
         "translation and rotation (w x y z) are the sensor's pose in the ego frame; "
-        "camera_intrinsic is for rectified pictures"
+        "camera_intrinsic is for rectified images"
     )
     camera = _record(frames.camera, ego_from_camera, calibration.camera)
     camera[STATEMENT_KEY] = list(statement(file, meaning, rectified=True))

@@ -25,7 +25,7 @@ POSE_ONLY = "contains the pose only: keep your camera_info, or also export openc
 STATEMENT_KEY = "cocalib"
 """The key of the statement in formats that have keys but no comments, and whose readers ignore unknown keys."""
 
-_OF_RECTIFIED = " of the rectified picture"
+_OF_RECTIFIED = " of the rectified image"
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
 
@@ -44,7 +44,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
     Args:
         file: what is exported.
         meaning: what the numbers of this format mean, with the order of the quaternion or the angles.
-        rectified: the format is for rectified pictures, so the check point's pixel is one of theirs.
+        rectified: the format is for rectified images, so the check point's pixel is one of theirs.
     """
     frames = file.frames
     lines = [

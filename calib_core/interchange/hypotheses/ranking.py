@@ -297,9 +297,9 @@ _SMALLEST_M = 1e-3
 
 
 def _tilts_rad(camera_from_radar: RigidTransform) -> tuple[float, float]:
-    """Return the angles between the viewing direction and the radar's x axis, and of the picture's lean to one side."""
+    """Return the angles between the viewing direction and the radar's x axis, and of the image's lean to one side."""
     rotation = camera_from_radar.rotation
-    lean = abs(math.atan2(rotation[0, 2], -rotation[1, 2]))  # of the radar's up axis in the picture
+    lean = abs(math.atan2(rotation[0, 2], -rotation[1, 2]))  # of the radar's up axis in the image
     return off_forward_rad(camera_from_radar), lean
 
 

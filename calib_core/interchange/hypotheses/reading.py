@@ -253,7 +253,7 @@ def clear_meaning(
 
 
 def _camera(file: UnstatedFile, pose: FoundPose) -> tuple[Camera | None, np.ndarray | None]:
-    """Return the camera in the file, or its matrix alone if the size of its pictures is not stated.
+    """Return the camera in the file, or its matrix alone if the size of its images is not stated.
 
     Raises:
         InputError: a parameter is invalid.

@@ -12,10 +12,10 @@ from calib_core.interchange.own.lens_documents import (
     BOARD_VIEWS_SCHEMA,
     BoardViewDocument,
     BoardViewsDocument,
-    PictureSource,
+    ImageSource,
 )
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
-from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
+from calib_core.intrinsics import Board, BoardCorners, LeftOutImage
 from calib_core.measurements import TimeNs
 
 _LONGEST_NAME = 200
@@ -29,26 +29,26 @@ class BoardViews:
         board: what was looked for.
         source: where.
         views: in which the board was found.
-        searched: first and last number of runs of pictures that need not be looked at again.
+        searched: first and last number of runs of images that need not be looked at again.
         complete: whether the search came to its end.
     """
 
     board: Board
-    source: PictureSource
+    source: ImageSource
     views: tuple[BoardCorners, ...]
     searched: tuple[tuple[int, int], ...] = ()
     complete: bool = False
 
     def searched_indices(self) -> tuple[int, ...]:
-        """Return the numbers of the pictures that need not be looked at again, ascending."""
-        flags = np.zeros(self.source.pictures, dtype=bool)
+        """Return the numbers of the images that need not be looked at again, ascending."""
+        flags = np.zeros(self.source.images, dtype=bool)
         for first, last in self.searched:
             flags[first : last + 1] = True
         flags[[view.index for view in self.views]] = True
         return tuple(np.flatnonzero(flags).tolist())
 
-    def require_same(self, board: Board, source: PictureSource, *, file: str) -> None:
-        """Refuse views of another board or of other pictures.
+    def require_same(self, board: Board, source: ImageSource, *, file: str) -> None:
+        """Refuse views of another board or of other images.
 
         Raises:
             InputError: they are.
@@ -58,10 +58,10 @@ class BoardViews:
                 f"{file}: views of a {_said(self.board)}, but the board is a {_said(board)}; "
                 "give that board, or name another file"
             )
-        if self.source.sha256 != source.sha256 or self.source.pictures != source.pictures:
+        if self.source.sha256 != source.sha256 or self.source.images != source.images:
             raise InputError(
-                f"{file}: views in {self.source.name} ({self.source.pictures} pictures), not in {source.name} as it is now "
-                f"({source.pictures} pictures); give the same pictures, or name another file"
+                f"{file}: views in {self.source.name} ({self.source.images} images), not in {source.name} as it is now "
+                f"({source.images} images); give the same images, or name another file"
             )
 
 
@@ -97,16 +97,15 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
     """
     document = parse_document(text, BoardViewsDocument, source=source)
     board = document.board
-    pictures = document.source.pictures
+    images = document.source.images
     for place, (first, last) in enumerate(document.searched):
-        if not first <= last < pictures:
-            raise InputError(f"{source}: searched[{place}]: {first} to {last} of {pictures} pictures; search again")
+        if not first <= last < images:
+            raise InputError(f"{source}: searched[{place}]: {first} to {last} of {images} images; search again")
     views = tuple(
-        _view(view, board, pictures, source=source, place=f"views[{place}]")
-        for place, view in enumerate(document.views)
+        _view(view, board, images, source=source, place=f"views[{place}]") for place, view in enumerate(document.views)
     )
     if len({view.index for view in views}) < len(views):
-        raise InputError(f"{source}: views: two are of the same picture; search again")
+        raise InputError(f"{source}: views: two are of the same image; search again")
     return BoardViews(
         board,
         document.source,
@@ -116,13 +115,13 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
     )
 
 
-def published_source(source: PictureSource) -> PictureSource:
-    """Return a source of pictures with a name that is not longer than files may state, and not empty."""
-    return structs.replace(source, name=source.name[:_LONGEST_NAME] or "pictures")
+def published_source(source: ImageSource) -> ImageSource:
+    """Return a source of images with a name that is not longer than files may state, and not empty."""
+    return structs.replace(source, name=source.name[:_LONGEST_NAME] or "images")
 
 
-def published_left_out(left_out: Iterable[LeftOutPicture]) -> list[LeftOutPicture]:
-    """Return pictures that are not used, with names that are not longer than files may state."""
+def published_left_out(left_out: Iterable[LeftOutImage]) -> list[LeftOutImage]:
+    """Return images that are not used, with names that are not longer than files may state."""
     return [structs.replace(one, name=one.name[:_LONGEST_NAME]) for one in left_out]
 
 
@@ -138,22 +137,22 @@ def _view_document(view: BoardCorners) -> BoardViewDocument:
     )
 
 
-def _view(document: BoardViewDocument, board: Board, pictures: int, *, source: str, place: str) -> BoardCorners:
+def _view(document: BoardViewDocument, board: Board, images: int, *, source: str, place: str) -> BoardCorners:
     """Return a view.
 
     Raises:
-        InputError: it cannot be one of this board in these pictures.
+        InputError: it cannot be one of this board in these images.
     """
     ids, count = np.array(document.corner_ids), len(board.corners_m)
     if len(ids) != len(document.pixels_px) or not np.all(np.diff(ids) > 0) or ids[-1] >= count:
         raise InputError(
             f"{source}: {place}: corner_ids must ascend, be below {count} and as many as pixels_px; search again"
         )
-    if document.index >= pictures:
-        raise InputError(f"{source}: {place}.index: {document.index} of {pictures} pictures; search again")
+    if document.index >= images:
+        raise InputError(f"{source}: {place}.index: {document.index} of {images} images; search again")
     pixels = np.array(document.pixels_px)
     if np.any(pixels < -1.0) or np.any(pixels > document.size_px):
-        raise InputError(f"{source}: {place}.pixels_px: a corner is outside its picture; search again")
+        raise InputError(f"{source}: {place}.pixels_px: a corner is outside its image; search again")
     return BoardCorners(
         document.index,
         document.name,

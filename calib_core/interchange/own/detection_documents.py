@@ -12,7 +12,7 @@ BOXES_SCHEMA: Final = "cocalib/boxes-1"
 LABELS_SCHEMA: Final = "cocalib/labels-1"
 
 Label = Annotated[str, Meta(max_length=200)]
-PictureSide = Annotated[int, Meta(ge=1, le=1_000_000)]
+ImageSide = Annotated[int, Meta(ge=1, le=1_000_000)]
 
 
 class BoxDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -39,7 +39,7 @@ class BoxesDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
     schema: Literal["cocalib/boxes-1"]
     frames: list[FrameDocument]
-    image_size_px: tuple[PictureSide, PictureSide] | None = None
+    image_size_px: tuple[ImageSide, ImageSide] | None = None
 
 
 class LabelsDocument(Struct, frozen=True, forbid_unknown_fields=True):

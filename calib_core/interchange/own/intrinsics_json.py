@@ -9,12 +9,12 @@ from calib_core.interchange.own.documents import camera_document, finite_or_none
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
     CoverageDocument,
+    ImageSource,
     IntrinsicsDocument,
     LensParameterDocument,
     LensPoseDocument,
     LensViewDocument,
     ModelTrialDocument,
-    PictureSource,
     ResidualFieldDocument,
     UncertaintyDocument,
 )
@@ -34,7 +34,7 @@ from calib_core.words.intrinsics import halves_text, residuals_text
 
 def write_intrinsics(
     lens: CalibratedLens,
-    source: PictureSource,
+    source: ImageSource,
     *,
     searched: int,
     field_of_view_deg: tuple[float, float],
@@ -44,7 +44,7 @@ def write_intrinsics(
 
     Args:
         lens: with its views.
-        source: of the pictures.
+        source: of the images.
         searched: how many of them were looked at.
         field_of_view_deg: along the middle row and the middle column [deg].
         coverage: of the used views.

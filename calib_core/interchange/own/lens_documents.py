@@ -6,7 +6,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import CameraDocument
-from calib_core.intrinsics import Board, LeftOutPicture
+from calib_core.intrinsics import Board, LeftOutImage
 from calib_core.json_forms import Count, Measured, Name, Pixel
 from calib_core.words import WarningText
 
@@ -18,16 +18,16 @@ _Number = Annotated[int, Meta(ge=0, le=1_000_000_000)]
 _Text = Annotated[str, Meta(max_length=10_000)]
 
 
-class PictureSource(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the pictures come from: what it is called, how many there are, and a hash by which it is known again."""
+class ImageSource(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the images come from: what it is called, how many there are, and a hash by which it is known again."""
 
     name: Name
-    pictures: Count
+    images: Count = msgspec.field(name="pictures")
     sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The corners of the board in one picture; (0, 0) is the centre of the top-left pixel."""
+    """The corners of the board in one image; (0, 0) is the centre of the top-left pixel."""
 
     index: _Number
     name: Name
@@ -41,12 +41,12 @@ class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_de
 class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a search for a board has found so far; with it the search is resumed, or not done again.
 
-    searched are the first and the last number of runs of pictures that need not be looked at again.
+    searched are the first and the last number of runs of images that need not be looked at again.
     """
 
     schema: Literal["cocalib/board-views-1"]
     board: Board
-    source: PictureSource
+    source: ImageSource
     complete: bool
     searched: list[tuple[_Number, _Number]]
     views: list[BoardViewDocument]
@@ -92,7 +92,7 @@ class ModelTrialDocument(Struct, frozen=True):
 
 
 class UncertaintyDocument(Struct, frozen=True):
-    """Standard deviation of the projection of far points over the picture; null where the lens sees nothing."""
+    """Standard deviation of the projection of far points over the image; null where the lens sees nothing."""
 
     x_px: list[float]
     y_px: list[float]
@@ -101,7 +101,7 @@ class UncertaintyDocument(Struct, frozen=True):
 
 
 class ResidualFieldDocument(Struct, frozen=True):
-    """Mean residuals over cells of the picture with their standard errors; null in empty cells."""
+    """Mean residuals over cells of the image with their standard errors; null in empty cells."""
 
     x_px: list[float]
     y_px: list[float]
@@ -128,7 +128,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     schema: Literal["cocalib/intrinsics-1"]
     camera: CameraDocument
     board: Board
-    source: PictureSource
+    source: ImageSource
     parameters: list[LensParameterDocument]
     field_of_view_deg: tuple[float | None, float | None]
     rms_px: float | None
@@ -137,7 +137,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     models: list[ModelTrialDocument]
     searched: int
     views: list[LensViewDocument]
-    left_out: list[LeftOutPicture]
+    left_out: list[LeftOutImage]
     projection_uncertainty: UncertaintyDocument
     residual_field: ResidualFieldDocument
     coverage: CoverageDocument | None

@@ -149,7 +149,7 @@ def write_pairs(pairs_file: PairsFile) -> str:
 
 
 _TABLE_COLUMNS = ("x", "y", "z", "u", "v")
-_TABLE_HINT = "a table of pairs has the columns x, y, z of the radar [m] and u, v of the picture [px], and maybe id"
+_TABLE_HINT = "a table of pairs has the columns x, y, z of the radar [m] and u, v of the image [px], and maybe id"
 
 
 def _cells(text: str) -> list[list[str]]:

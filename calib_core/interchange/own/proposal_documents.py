@@ -24,8 +24,8 @@ class DwellDocument(Struct, frozen=True):
     snr_db: Measured | None = None
 
 
-class PictureCandidateDocument(Struct, frozen=True):
-    """A place in the picture; strength of the change there in standard deviations; likeness to the confirmed reflector."""
+class ImageCandidateDocument(Struct, frozen=True):
+    """A place in the image; strength of the change there in standard deviations; likeness to the confirmed reflector."""
 
     pixel_px: Pixel
     sigma_px: Positive
@@ -45,7 +45,7 @@ class ProposalDocument(Struct, frozen=True):
     confidence: _Share
     reason: str
     click: ClickDocument
-    candidates: list[PictureCandidateDocument]
+    candidates: list[ImageCandidateDocument]
 
 
 class UnproposedDocument(Struct, frozen=True):

@@ -13,7 +13,7 @@ from calib_core.interchange.format import looks_like_camera, looks_like_radar
 from calib_core.interchange.trees.frame_tree import FrameTree
 
 _FIXTURE = re.compile(r"mount|bracket|holder|support|housing|plate|base|rig|bar\b|rack|mast", re.IGNORECASE)
-_NO_PICTURES = re.compile(r"imu|gyro|accel|lidar|velodyne|laser|gps|gnss", re.IGNORECASE)
+_NO_IMAGES = re.compile(r"imu|gyro|accel|lidar|velodyne|laser|gps|gnss", re.IGNORECASE)
 _SAME = 1e-6
 
 
@@ -102,7 +102,7 @@ def is_of_camera(tree: FrameTree, frame: str) -> bool:
     sensor = tree.sensor_at(frame)
     if sensor is not None:
         return sensor.kind == "camera"
-    return looks_like_camera(frame) and not _NO_PICTURES.search(frame)
+    return looks_like_camera(frame) and not _NO_IMAGES.search(frame)
 
 
 def is_fixture(frame: str) -> bool:

@@ -11,7 +11,7 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor, TreePart
 
 _EGO = "ego"
-_NOTE = "nuScenes' camera frames have optical axes, and its pictures are undistorted"
+_NOTE = "nuScenes' camera frames have optical axes, and its images are undistorted"
 
 
 def recognizes_poses(content: Content) -> bool:

@@ -68,14 +68,14 @@ class ImageStream:
         self._require_usual((image.width_px, image.height_px))
         return image
 
-    def picture(self, index: int) -> np.ndarray:
+    def image(self, index: int) -> np.ndarray:
         """Return a frame's pixels, blue first.
 
         Raises:
             MessageError: it cannot be read, or has another size than the others.
         """
         layout, payload = self._frame(index)
-        pixels = layout.picture(payload)
+        pixels = layout.image(payload)
         self._require_usual((pixels.shape[1], pixels.shape[0]))
         return pixels
 
@@ -136,9 +136,9 @@ class VideoStream(ImageStream):
 
     def encoded(self, index: int) -> EncodedImage:
         """Return a frame encoded as JPEG."""
-        return encoded_pixels(self.picture(index))
+        return encoded_pixels(self.image(index))
 
-    def picture(self, index: int) -> np.ndarray:
+    def image(self, index: int) -> np.ndarray:
         """Return a frame's pixels, blue first.
 
         Raises:
@@ -146,18 +146,18 @@ class VideoStream(ImageStream):
         """
         assert self.decoder is not None
         try:
-            return self.decoder.picture(int(self.row[index]))
+            return self.decoder.image(int(self.row[index]))
         except MessageError as error:
             raise MessageError(f"topic {self.topic.name}: {error}") from error
 
     def size_px(self, index: int) -> tuple[int, int]:
         """Return a frame's width and height."""
-        height, width = self.picture(index).shape[:2]
+        height, width = self.image(index).shape[:2]
         return width, height
 
 
 def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesNs) -> ImageStream:
-    """Build the stream of an image topic with pictures or video."""
+    """Build the stream of an image topic with images or video."""
     stream = ImageStream.build(topic, layouts, stamps_ns)
 
     def packet(number: int) -> Packet | None:
@@ -201,7 +201,7 @@ def about_video(images: ImageStream | None) -> list[DataWarning]:
 
 
 def frames_of_one_size(images: ImageStream | None) -> tuple[ImageStream | None, list[DataWarning]]:
-    """Drop frames of an unusual size and frames that are no pictures, with a warning for each kind.
+    """Drop frames of an unusual size and frames that are no images, with a warning for each kind.
 
     All frames of a short recording are examined. Of a longer one, frames spread over it are examined, and all if those
     differ; a frame that differs from them all is refused when it is read.
@@ -238,7 +238,7 @@ def _about_sizes(
     return [
         DataWarning.reported(
             "picture-sizes",
-            f"{images.topic.name} has pictures of several sizes: {sizes[usual]} have {usual[0]} x {usual[1]} pixels and are "
+            f"{images.topic.name} has images of several sizes: {sizes[usual]} have {usual[0]} x {usual[1]} pixels and are "
             f"used; {', '.join(others)} and are skipped",
             "if the skipped ones are those you need, record again with one size, or open their part of the recording alone",
         )
@@ -252,7 +252,7 @@ def _about_unreadable(images: ImageStream, found: Sequence[tuple[int, int] | Mes
     return [
         DataWarning.reported(
             "unreadable-pictures",
-            f"{len(rows)} of {len(found)} pictures of {images.topic.name} cannot be read and are skipped "
+            f"{len(rows)} of {len(found)} images of {images.topic.name} cannot be read and are skipped "
             f"({_times(images, rows)}): {found[rows[0]]}",
             "no action needed unless a placement is there; if there are many, copy the recording again from its source",
         )

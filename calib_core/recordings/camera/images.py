@@ -57,7 +57,7 @@ def is_packet(definition: Definition) -> bool:
     return definition.names >= _PACKET_NAMES and not is_raw_image(definition)
 
 
-def is_picture(definition: Definition) -> bool:
+def is_image(definition: Definition) -> bool:
     """Return whether a message is laid out as any of them."""
     return is_raw_image(definition) or is_compressed_image(definition) or is_packet(definition)
 
@@ -75,7 +75,7 @@ class ImageLayout:
         return not is_raw_image(self.definition)
 
     def check(self, payload: bytes) -> None:
-        """Check a topic's first message without decoding the picture.
+        """Check a topic's first message without decoding the image.
 
         Raises:
             MessageError: the encoding is not supported; the text lists those that are.
@@ -90,7 +90,7 @@ class ImageLayout:
             raise self._refused(str(error)) from error
 
     def packet(self, payload: bytes) -> Packet | None:
-        """Return the video packet in a message; None if the message contains a complete picture.
+        """Return the video packet in a message; None if the message contains a complete image.
 
         Raises:
             MessageError: the message cannot be read.
@@ -112,7 +112,7 @@ class ImageLayout:
         return f"{packet.codec} video" if packet else self._file(message).format
 
     def size_px(self, payload: bytes) -> tuple[int, int]:
-        """Return width and height without decoding the picture.
+        """Return width and height without decoding the image.
 
         Raises:
             MessageError: the message cannot be read.
@@ -156,7 +156,7 @@ class ImageLayout:
             return self._file(message)
         return encoded_pixels(self._converted(message))
 
-    def picture(self, payload: bytes) -> np.ndarray:
+    def image(self, payload: bytes) -> np.ndarray:
         """Return the frame's pixels: uint8 (h, w, 3), blue first.
 
         Raises:
@@ -169,10 +169,10 @@ class ImageLayout:
 
         file = self._file(message)
         flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-        picture = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), flags)
-        if picture is None:
-            raise self._refused(f"a {file.format} picture of {len(file.data)} bytes is damaged; choose another frame")
-        return np.asarray(picture)
+        image = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), flags)
+        if image is None:
+            raise self._refused(f"a {file.format} image of {len(file.data)} bytes is damaged; choose another frame")
+        return np.asarray(image)
 
     def _converted(self, message: Message) -> np.ndarray:
         try:
@@ -195,7 +195,7 @@ class ImageLayout:
         said = message.text("format")
         if "compressedDepth" in said:
             raise self._refused(
-                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic; {READABLE}"
+                f"'{said}' is a depth image, not an image; choose a colour or grey image topic; {READABLE}"
             )
         try:
             if data.startswith(JPEG_MAGIC):
@@ -227,12 +227,12 @@ class ImageLayout:
 
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
         if pixels is None:
-            raise MessageError(f"a png picture of {len(data)} bytes is damaged; choose another frame")
+            raise MessageError(f"a png image of {len(data)} bytes is damaged; choose another frame")
         eight = cv2.imencode(".png", stretched(np.asarray(pixels)))[1].tobytes()
         return EncodedImage(eight, "png", width, height)
 
 
-def encoded_pixels(picture: np.ndarray) -> EncodedImage:
+def encoded_pixels(image: np.ndarray) -> EncodedImage:
     """Encode pixels as JPEG at a quality sufficient for clicking."""
     import cv2
 
@@ -240,8 +240,8 @@ def encoded_pixels(picture: np.ndarray) -> EncodedImage:
         cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
         cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
     ]  # fmt: skip
-    _, data = cv2.imencode(".jpg", picture, settings)
-    return EncodedImage(data.tobytes(), "jpeg", picture.shape[1], picture.shape[0])
+    _, data = cv2.imencode(".jpg", image, settings)
+    return EncodedImage(data.tobytes(), "jpeg", image.shape[1], image.shape[0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ _BEGINNINGS = (b"BM", b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"II*\0", b"MM\0
 def repaired_jpeg(data: bytes) -> tuple[bytes, int, int]:
     """Return a JPEG ready for any decoder, with its width and height [px].
 
-    The recorded bytes are kept except for two repairs: Exif blocks are removed (a viewer would rotate the picture by
+    The recorded bytes are kept except for two repairs: Exif blocks are removed (a viewer would rotate the image by
     their orientation, away from the camera's pixels), and a missing end marker is added (browsers require it).
 
     Raises:
@@ -107,7 +107,7 @@ def png_fault(data: bytes) -> str:
     return "is a PNG that is cut off"
 
 
-def picture_fault(path: Path) -> str:
+def image_fault(path: Path) -> str:
     """Say why a file cannot be decoded, judging by its first and last bytes; "" if it looks whole."""
     try:
         with path.open("rb") as file:
@@ -121,7 +121,7 @@ def picture_fault(path: Path) -> str:
                 return _jpeg_fault(head, path)
     except OSError as error:
         return f"cannot be read: {error.strerror}"
-    return "" if head.startswith(_BEGINNINGS) else f"is not a picture (it begins with {head[:4].hex()})"
+    return "" if head.startswith(_BEGINNINGS) else f"is not an image (it begins with {head[:4].hex()})"
 
 
 def _jpeg_fault(head: bytes, path: Path) -> str:
@@ -135,7 +135,7 @@ def _jpeg_fault(head: bytes, path: Path) -> str:
     return ""
 
 
-def picture_size_px(path: Path) -> tuple[int, int] | None:
+def image_size_px(path: Path) -> tuple[int, int] | None:
     """Return width and height of a JPEG or PNG file; None for others, and for damaged ones."""
     try:
         data = path.read_bytes()

@@ -116,7 +116,7 @@ def _window(message: Message) -> tuple[tuple[int, int], tuple[int, int], tuple[i
 
 
 class PublishedCamera(Protocol):
-    """Intrinsics that stand in a file beside the pictures."""
+    """Intrinsics that stand in a file beside the images."""
 
     @property
     def file(self) -> Path:
@@ -128,7 +128,7 @@ class PublishedCamera(Protocol):
         """What is not certain about them; "" if nothing."""
         ...
 
-    def camera(self, picture_size_px: tuple[int, int]) -> Camera:
+    def camera(self, image_size_px: tuple[int, int]) -> Camera:
         """Return the camera; raises ValueError if the numbers are not a camera's."""
         ...
 

@@ -18,7 +18,7 @@ _CODECS = {"h264": "h264", "avc": "h264", "h265": "hevc", "hevc": "hevc"}
 _START = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _LOOK_BYTES = 4096
 _LOOK_AHEAD = 16
-_KEPT_PICTURES = 8
+_KEPT_IMAGES = 8
 _INSTALL = "pip install 'cocalib[video]'"
 
 
@@ -38,7 +38,7 @@ class Packet:
 
 
 def packet_of(message: Message) -> Packet | None:
-    """Extract the encoded frame of a foxglove CompressedVideo, CompressedImage or FFMPEGPacket; None if it is a picture."""
+    """Extract the encoded frame of a foxglove CompressedVideo, CompressedImage or FFMPEGPacket; None if it is an image."""
     said = next((message.text(name) for name in ("format", "encoding") if name in message), "").lower()
     words = re.findall(r"[a-z0-9]+", said.replace(".", "").replace("libx", "h").replace("_", " "))
     codec = next((_CODECS[word] for word in words if word in _CODECS), None)
@@ -52,7 +52,7 @@ def packet_of(message: Message) -> Packet | None:
 
 
 def _begins_with_key(codec: str, data: bytes) -> bool:
-    """Return whether decoding can begin here, from the first stream units: parameter sets or an independent picture."""
+    """Return whether decoding can begin here, from the first stream units: parameter sets or an independent image."""
     for match in _START.finditer(data[:_LOOK_BYTES]):
         unit = match[1][0]
         kind = unit & 0x1F if codec == "h264" else unit >> 1 & 0x3F
@@ -92,7 +92,7 @@ class PacketDecoder:
         self._context: Any = None
         self._next = -1
 
-    def picture(self, number: int) -> np.ndarray:
+    def image(self, number: int) -> np.ndarray:
         """Return the pixels of a message's frame: uint8 (h, w, 3), blue first.
 
         Raises:
@@ -144,5 +144,5 @@ class PacketDecoder:
             raise MessageError(f"frame {number} of the video is damaged ({error}); choose another frame") from error
         for frame in frames:
             self._kept[int(frame.pts)] = frame.to_ndarray(format="bgr24")
-        while len(self._kept) > _KEPT_PICTURES:
+        while len(self._kept) > _KEPT_IMAGES:
             self._kept.popitem(last=False)

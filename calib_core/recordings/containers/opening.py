@@ -23,10 +23,10 @@ _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
 _FIRST_ROWS = 500
-_FIRST_BYTES = 1 << 19  # usually enough for the first picture
+_FIRST_BYTES = 1 << 19  # usually enough for the first image
 _LAST_BYTES = 1 << 16  # most of a file's metadata
 _KINDS = (
-    "supported: ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders, folders of pictures or radar files, "
+    "supported: ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders, folders of images or radar files, "
     "radar CSV and videos"
 )
 _PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)

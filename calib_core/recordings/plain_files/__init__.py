@@ -1,1 +1,1 @@
-"""Recordings outside ROS containers: pictures, CSV, radar files and videos."""
+"""Recordings outside ROS containers: images, CSV, radar files and videos."""

@@ -1,4 +1,4 @@
-"""The intrinsics that data sets publish beside their pictures: KITTI, View-of-Delft, nuScenes and Astyx."""
+"""The intrinsics that data sets publish beside their images: KITTI, View-of-Delft, nuScenes and Astyx."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.parsing import json_rows, json_value
-from calib_core.recordings.camera.jpeg import picture_size_px
+from calib_core.recordings.camera.jpeg import image_size_px
 
 _MAX_BYTES = 1 << 29
 _LEVELS = 4
@@ -29,8 +29,8 @@ class FolderCamera:
     Attributes:
         file: where it stands.
         matrix_px: (3, 3) K.
-        distortion: (k,) k1 k2 p1 p2 k3, or none for rectified pictures.
-        size_px: width and height; None if the file does not state them: those of the pictures.
+        distortion: (k,) k1 k2 p1 p2 k3, or none for rectified images.
+        size_px: width and height; None if the file does not state them: those of the images.
         pose: how to use the pose that the file also holds; "" if it holds none.
         doubt: what is not certain about it; "" if nothing.
     """
@@ -42,36 +42,36 @@ class FolderCamera:
     pose: str = ""
     doubt: str = ""
 
-    def camera(self, picture_size_px: tuple[int, int]) -> Camera:
+    def camera(self, image_size_px: tuple[int, int]) -> Camera:
         """Return the camera.
 
         Args:
-            picture_size_px: width and height of the pictures.
+            image_size_px: width and height of the images.
 
         Raises:
             ValueError: the numbers are not a camera's.
         """
         model = "plumb_bob" if len(self.distortion) else "pinhole"
-        return Camera(model, *(self.size_px or picture_size_px), self.matrix_px, self.distortion)
+        return Camera(model, *(self.size_px or image_size_px), self.matrix_px, self.distortion)
 
 
-def camera_beside(folder: Path, files: Sequence[Path], picture_size_px: tuple[int, int] | None) -> FolderCamera | None:
-    """Find the intrinsics that a data set publishes for a folder of pictures; None if there are none.
+def camera_beside(folder: Path, files: Sequence[Path], image_size_px: tuple[int, int] | None) -> FolderCamera | None:
+    """Find the intrinsics that a data set publishes for a folder of images; None if there are none.
 
     Args:
-        folder: of the pictures.
-        files: the pictures.
-        picture_size_px: of the first; None if it cannot be read.
+        folder: of the images.
+        files: the images.
+        image_size_px: of the first; None if it cannot be read.
     """
     try:
-        found = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, picture_size_px)
+        found = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, image_size_px)
         return found or _of_nuscenes(folder, files) or _of_astyx(folder, files)
     except (OSError, ValueError, KeyError, TypeError, RecursionError, AttributeError, InputError):
         return None  # a file of that name but of another form is not a data set's calibration
 
 
-def size_of_pictures_beside(calibration: Path) -> tuple[int, int] | None:
-    """Return the size of the pictures that a KITTI or View-of-Delft calibration belongs to; None if there are none.
+def size_of_images_beside(calibration: Path) -> tuple[int, int] | None:
+    """Return the size of the images that a KITTI or View-of-Delft calibration belongs to; None if there are none.
 
     Args:
         calibration: such as calib/00000.txt beside image_2, or calib.txt beside or in it.
@@ -79,8 +79,8 @@ def size_of_pictures_beside(calibration: Path) -> tuple[int, int] | None:
     around = calibration.absolute().parent
     for folder in (around.parent / "image_2", around / "image_2", around):
         named = folder / calibration.stem
-        for picture in (*(named.with_suffix(suffix) for suffix in _SUFFIXES), *sorted(folder.glob("*"))[:1]):
-            if picture.suffix.lower() in _SUFFIXES and (size := picture_size_px(picture)):
+        for image in (*(named.with_suffix(suffix) for suffix in _SUFFIXES), *sorted(folder.glob("*"))[:1]):
+            if image.suffix.lower() in _SUFFIXES and (size := image_size_px(image)):
                 return size
     return None
 
@@ -135,17 +135,17 @@ def _of_kitti_frames(folder: Path, files: Sequence[Path]) -> FolderCamera | None
     return FolderCamera(found[0], matrices[0], np.zeros(0), None, pose, doubt)
 
 
-def _of_raw_kitti(folder: Path, picture_size_px: tuple[int, int] | None) -> FolderCamera | None:
-    """Read calib_cam_to_cam.txt: the rectified camera, or the raw one if the pictures have its size."""
+def _of_raw_kitti(folder: Path, image_size_px: tuple[int, int] | None) -> FolderCamera | None:
+    """Read calib_cam_to_cam.txt: the rectified camera, or the raw one if the images have its size."""
     number = _number_of(folder)
     file = next((above / _RAW_KITTI for above in _above(folder) if (above / _RAW_KITTI).is_file()), None)
     if number is None or file is None:
         return None
     lines = _lines(file)
     rectified, raw = (lines.get(f"{key}_0{number}") for key in ("S_rect", "S"))
-    if raw is not None and picture_size_px == tuple(raw.astype(int)) and f"K_0{number}" in lines:
+    if raw is not None and image_size_px == tuple(raw.astype(int)) and f"K_0{number}" in lines:
         matrix, distortion = lines[f"K_0{number}"].reshape(3, 3), lines.get(f"D_0{number}", np.zeros(0))
-        return FolderCamera(file, matrix, distortion, picture_size_px)
+        return FolderCamera(file, matrix, distortion, image_size_px)
     matrix = lines[f"P_rect_0{number}"].reshape(3, 4)[:, :3]
     size = None if rectified is None else (int(rectified[0]), int(rectified[1]))
     return FolderCamera(file, matrix, np.zeros(0), size)
@@ -169,7 +169,7 @@ def _of_nuscenes(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
         tokens = _tokens_of(tables.with_name("sample_data.json"), {file.name for file in files})
         used = [row for row in mine if row["token"] in tokens]
         if len({json.dumps(row["camera_intrinsic"]) for row in used}) != 1:
-            doubt = "the pictures come from several cars or days with other intrinsics; those of the first are used"
+            doubt = "the images come from several cars or days with other intrinsics; those of the first are used"
         mine = used or mine
     pose = f"its pose: records of {folder.name} and of the radar in {tables}, each in the car's frame"
     return FolderCamera(tables, np.array(mine[0]["camera_intrinsic"], dtype=np.float64), np.zeros(0), None, pose, doubt)
@@ -187,7 +187,7 @@ def _of_astyx(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
 
 
 def _tokens_of(path: Path, names: set[str]) -> dict[str, None]:
-    """Return the calibrated sensors of pictures, in the order of the table, which may have more than 1 GB."""
+    """Return the calibrated sensors of images, in the order of the table, which may have more than 1 GB."""
     left, found = set(names), dict[str, None]()
     rows = json_rows(path, source=str(path)) if path.is_file() else iter(())
     while left and (row := next(rows, None)):

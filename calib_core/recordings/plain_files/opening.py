@@ -1,4 +1,4 @@
-"""Open folders of pictures and radar files, tables and videos, with or without ROS recordings; what is not used is named."""
+"""Open folders of images and radar files, tables and videos, with or without ROS recordings; what is not used is named."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.sources import Assumption
-from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
+from calib_core.recordings.plain_files.images import IMAGE_SUFFIXES, open_image_folder
 from calib_core.recordings.plain_files.radar_scans import (
     is_lidar_bin,
     is_lidar_pcd,
@@ -30,7 +30,7 @@ from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
 
 _Opener = Callable[[Path, Sequence[Path], PlainOptions, PlainSource | None], PlainSource]
 _FOLDERS: Mapping[str, _Opener] = {
-    **dict.fromkeys(PICTURE_SUFFIXES, open_picture_folder),
+    **dict.fromkeys(IMAGE_SUFFIXES, open_image_folder),
     ".pcd": open_pcd_folder,
     ".bin": open_bin_folder,
 }
@@ -114,14 +114,14 @@ class _Opening:
             self.left.append(path)
 
     def finish(self) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
-        """Open everything, pictures first, since files without times have those of the files of their names or numbers.
+        """Open everything, images first, since files without times have those of the files of their names or numbers.
 
         Raises:
             RecordingError: what the user named, or all that was found, cannot be used.
         """
         known: PlainSource | None = None
         opened: dict[int, PlainSource] = {}
-        for place in sorted(range(len(self.found)), key=lambda place: not _has_pictures(self.found[place][1])):
+        for place in sorted(range(len(self.found)), key=lambda place: not _has_images(self.found[place][1])):
             path, files, inside = self.found[place]
             source = self._open(path, files, known, inside=inside)
             if source is not None:
@@ -197,8 +197,8 @@ def _tells_times(source: PlainSource) -> bool:
     return bool(source.names) and not source.counted and bool((np.diff(source.times_ns) > 0).all())
 
 
-def _has_pictures(files: Sequence[Path]) -> bool:
-    return bool(files) and files[0].suffix.lower() in PICTURE_SUFFIXES
+def _has_images(files: Sequence[Path]) -> bool:
+    return bool(files) and files[0].suffix.lower() in IMAGE_SUFFIXES
 
 
 def _reasons(refused: Sequence[tuple[Path, str]]) -> str:
@@ -282,8 +282,8 @@ def contents_of(folder: Path, options: PlainOptions) -> Contents:
             contents.refused += _no_files([entry for entry in entries if not entry.is_dir()])
             contents.sources.append((folder, _one_kind(folder, kinds)))
             _add_radar_tables(entries, contents, options)
-            below_pictures = "a folder below pictures or radar files; open it by its own path"
-            contents.refused += [(entry, below_pictures) for entry in entries if entry.is_dir()]
+            below_images = "a folder below images or radar files; open it by its own path"
+            contents.refused += [(entry, below_images) for entry in entries if entry.is_dir()]
         else:
             _walk(folder, contents, options, 0)
         contents.inside = [path for path, _ in contents.sources] != [folder]
@@ -297,13 +297,13 @@ def _entries(folder: Path, options: PlainOptions) -> list[Path]:
 
 
 def _kind(file: Path) -> str:
-    """Return "pictures", ".pcd" or ".bin"; "" for any other file."""
+    """Return "images", ".pcd" or ".bin"; "" for any other file."""
     suffix = file.suffix.lower()
-    return "pictures" if suffix in PICTURE_SUFFIXES else suffix if suffix in (".pcd", ".bin") else ""
+    return "images" if suffix in IMAGE_SUFFIXES else suffix if suffix in (".pcd", ".bin") else ""
 
 
 def _no_files(entries: Sequence[Path]) -> list[tuple[Path, str]]:
-    """Name what has the name of a picture, a scan or a table and is no file, so that it is not lost in silence."""
+    """Name what has the name of an image, a scan or a table and is no file, so that it is not lost in silence."""
     what = "a broken link, a pipe or a folder"
     tables = [one for one in entries if one.suffix.lower() in TABLE_SUFFIXES and not one.is_dir()]
     return [(one, what) for one in (*filter(_kind, entries), *tables) if not one.is_file()]
@@ -326,7 +326,7 @@ def _one_kind(folder: Path, kinds: dict[str, list[Path]]) -> tuple[Path, ...]:
     if len(kinds) > 1:
         what = " and ".join(f"{len(files)} {files[0].suffix}" for files in kinds.values())
         raise RecordingError(
-            f"{folder}: the folder contains {what} files; put pictures and radar files into separate folders"
+            f"{folder}: the folder contains {what} files; put images and radar files into separate folders"
         )
     return tuple(next(iter(kinds.values())))
 
@@ -348,7 +348,7 @@ def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -
         _add_files(folder, files, folders, contents, options)
     for inner in folders:
         if inner.name.lower() in _CALIBRATIONS:
-            continue  # read with the pictures beside it
+            continue  # read with the images beside it
         reason = _unwalked(folder, inner, depth)
         if reason:
             contents.refused.append((inner, reason))
@@ -374,9 +374,9 @@ def _add_leaf(folder: Path, kinds: dict[str, list[Path]], contents: Contents) ->
     except RecordingError as error:
         contents.refused.append((folder, str(error).removeprefix(f"{folder}: ")))
         return
-    if _has_pictures(files) and _ECHOES.search(folder.name) and not _CAMERA.search(folder.name):
+    if _has_images(files) and _ECHOES.search(folder.name) and not _CAMERA.search(folder.name):
         contents.refused.append(
-            (folder, f"{len(files)} pictures of a radar's echoes by its name; open it by its own path")
+            (folder, f"{len(files)} images of a radar's echoes by its name; open it by its own path")
         )
         return
     lidar = {".bin": is_lidar_bin, ".pcd": is_lidar_pcd}.get(files[0].suffix.lower(), lambda _: False)
@@ -442,7 +442,7 @@ def _add_tables(group: Sequence[Path], contents: Contents, options: PlainOptions
 
 
 def _add_radar_tables(entries: Sequence[Path], contents: Contents, options: PlainOptions) -> None:
-    """Add the tables beside pictures that are a radar's; others give the times of the pictures."""
+    """Add the tables beside images that are a radar's; others give the times of the images."""
     for entry in entries:
         if entry.is_file() and entry.suffix.lower() in TABLE_SUFFIXES and not table_fault(entry, options):
             contents.sources.append((entry, ()))

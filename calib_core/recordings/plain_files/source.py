@@ -152,8 +152,8 @@ class PlainOptions:
     taken: frozenset[Path] = frozenset()
 
 
-def picture_channel(topic: str) -> Channel:
-    """Return the channel of a picture topic."""
+def image_channel(topic: str) -> Channel:
+    """Return the channel of an image topic."""
     return Channel(0, topic, "sensor_msgs/CompressedImage", "ros1", "", "")
 
 
@@ -168,7 +168,7 @@ def header_bytes(time: TimeNs, frame: str) -> bytes:
     return struct.pack("<III", 0, sec, nanosec) + _string(frame)
 
 
-def picture_message(time: TimeNs, frame: str, data: bytes) -> bytes:
+def image_message(time: TimeNs, frame: str, data: bytes) -> bytes:
     """Return a CompressedImage; its format is recognized from the first bytes of the data."""
     return header_bytes(time, frame) + _string("") + struct.pack("<I", len(data)) + data
 

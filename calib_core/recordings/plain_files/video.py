@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
-from calib_core.recordings.plain_files.source import PlainSource, picture_channel, picture_message, topic_of
+from calib_core.recordings.plain_files.source import PlainSource, image_channel, image_message, topic_of
 from calib_core.recordings.time.written_times import read_time
 
 if TYPE_CHECKING:
@@ -44,10 +44,10 @@ def open_video(path: Path, start: str | None) -> PlainSource:
     warnings = () if video.steady else (_uneven(path),)
 
     def message(row: int) -> bytes:
-        return picture_message(TimeNs(int(times[row])), _FRAME, video.jpeg(row))
+        return image_message(TimeNs(int(times[row])), _FRAME, video.jpeg(row))
 
     return PlainSource(
-        path, path.stat().st_size, f"video, {len(times)} frames", picture_channel(topic_of(path, "image")), times, message,
+        path, path.stat().st_size, f"video, {len(times)} frames", image_channel(topic_of(path, "image")), times, message,
         warnings, video.close,
     )  # fmt: skip
 

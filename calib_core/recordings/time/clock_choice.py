@@ -18,7 +18,7 @@ YEAR_2000_NS = 946_684_800 * NS_PER_S
 _YEAR_2100_NS = 4_102_444_800 * NS_PER_S
 MANY = 0.01
 HALF_DISTINCT, RETURNS_DISTINCT = 0.5, 0.0
-"""Plausible shares of different stamps: of pictures and scans, which some drivers send twice; of messages of one return."""
+"""Plausible shares of different stamps: of images and scans, which some drivers send twice; of messages of one return."""
 _RECEIVE_DISTINCT = 0.9
 _WORST_BACK_S = 1.0
 Clock = Literal["auto", "header", "receive"]
@@ -37,7 +37,7 @@ class Stamps:
         topic: its name.
         receive_ns: (n,) the recorder's clock.
         header_ns: (n,) the stamps in the messages; None if they carry none.
-        distinct: the least share of different stamps that is plausible: a few pictures may be sent twice, and the returns
+        distinct: the least share of different stamps that is plausible: a few images may be sent twice, and the returns
             of one scan may share one.
         written: (n,) the messages in the order of the file, which shows a recorder's clock that was set back; None if unknown.
     """
@@ -195,7 +195,7 @@ def _without_the_recorder(both: tuple[Stamps, Stamps]) -> ClockChoice:
             DataWarning.reported(
                 "mixed-clocks",
                 f"the times of {names} come from clocks that cannot be compared, because each topic has only one usable clock",
-                "check in the page that radar and picture show the same moment; if they do not, record again",
+                "check in the page that radar and image show the same moment; if they do not, record again",
             )
         )
     return ClockChoice(clocks, tuple(warnings))

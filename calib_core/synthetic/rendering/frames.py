@@ -42,7 +42,7 @@ _GROUND_STAND_M = 0.35
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Thing:
-    """A moving object in the picture: the farthest is drawn first."""
+    """A moving object in the image: the farthest is drawn first."""
 
     distance_m: float
     draw: Callable[[np.ndarray], None]
@@ -187,11 +187,11 @@ class FrameRenderer:
         return _Thing(distance, lambda levels: self._draw_facets(levels, facets, distance))
 
     def _window(self, points_m: Points3, margin_px: float = 2.0) -> Window | None:
-        """Return the part of the picture in which points of the world (n, 3) are."""
+        """Return the part of the image in which points of the world (n, 3) are."""
         return Window.around(self.rig.camera.project(self.rig.camera_from_world @ points_m), self.rig.camera, margin_px)
 
     def _draw_limbs(self, levels: np.ndarray, limbs: tuple[Capsule, ...]) -> None:
-        """Draw limbs into the picture, farthest first, hidden by nearer parts of the backdrop."""
+        """Draw limbs into the image, farthest first, hidden by nearer parts of the backdrop."""
         still, pixel_rad = self.still, 1.0 / float(self.rig.camera.matrix_px[0, 0])
         for limb in sorted(limbs, key=lambda one: -float(np.linalg.norm(one.start_m + one.end_m - 2.0 * still.eye_m))):
             window = self._window(_outline(limb))

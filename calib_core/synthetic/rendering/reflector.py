@@ -1,4 +1,4 @@
-"""The trihedral corner reflector in the picture, and faces of other things.
+"""The trihedral corner reflector in the image, and faces of other things.
 
 Three square-cut facets meet at the apex. The apex is the phase centre: every path with three bounces is as long as the
 path to the apex and back. It is the point to click, and the reflector's position in truth.json.

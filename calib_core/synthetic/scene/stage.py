@@ -77,7 +77,7 @@ class Stage:
 
     @property
     def published_camera(self) -> Camera:
-        """The intrinsics in the recording's camera info, which may be wrong; those of the pictures are the rig's."""
+        """The intrinsics in the recording's camera info, which may be wrong; those of the images are the rig's."""
         camera, errors = self.rig.camera, self.options.intrinsics
         if errors == IntrinsicsErrors():
             return camera
@@ -213,7 +213,7 @@ class _Room:
         """Yield those of some positions (n, 3) that all cameras see, clear of the solids and of what is taken by then."""
         whole = in_sight(self.added, batch)
         for one in self.rigs:
-            whole &= _in_picture(one, batch)
+            whole &= _in_image(one, batch)
         if self.scene.board is not None:
             whole &= ~self.scene.board.hides(batch)
         for position in batch[whole]:
@@ -235,8 +235,8 @@ class _Room:
         return places if len(places) == self.options.reflectors else []
 
 
-def _in_picture(rig: Rig, places_m: Points3) -> Flags:
-    """Return which places in the world (n, 3) the camera sees, off the picture's border."""
+def _in_image(rig: Rig, places_m: Points3) -> Flags:
+    """Return which places in the world (n, 3) the camera sees, off the image's border."""
     camera = rig.camera
     return camera.in_image(camera.project(rig.camera_from_world @ places_m), margin_px=-_RIM_SHARE * camera.width_px)
 
@@ -260,7 +260,7 @@ def _board_places(rng: np.random.Generator, scene: Scene, rig: Rig, options: Sim
         return np.zeros((0, 3))
     assert scene.board is not None, "the options ask for corners only where there is a board"
     places = scene.board.corners_m - [_BEFORE_BOARD_M, 0.0, 0.0]
-    seen = _in_picture(rig, places)
+    seen = _in_image(rig, places)
     if options.board_corners > int(seen.sum()):
         raise OptionError(
             f"simulation option board_corners is {options.board_corners}, but the camera sees {int(seen.sum())} inner "

@@ -31,13 +31,13 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RecordedView]:
 
 
 def composed(view: RecordedView, index: int, trail_scans: int = 0) -> np.ndarray:
-    """Return one frame of the video, drawn over a grey picture."""
+    """Return one frame of the video, drawn over a grey image."""
     titles = ("a.json", "b.json")[: 1 if view.against is None else 2]
     panels = Panels(view, titles, trail_scans=trail_scans, size_px=(320, 240))
     block = next(block for block in frame_blocks(view.recording) if index - block.first < len(block.times_ns))
     panels.enter(block)
-    picture = np.full((240, 320, 3), GREY, np.uint8)
-    return panels.compose(picture, TimeNs(int(block.times_ns[index - block.first])))
+    image = np.full((240, 320, 3), GREY, np.uint8)
+    return panels.compose(image, TimeNs(int(block.times_ns[index - block.first])))
 
 
 def test_every_frame_is_in_the_video_at_its_recorded_time(view, tmp_path):
@@ -96,26 +96,26 @@ def test_clicks_stay_half_a_second_with_the_length_of_their_residual(view):
         bool((composed(view, clicked + after) != composed(unclicked, clicked + after)).any()) for after in range(-1, 3)
     ]
     assert differs == [False, True, True, False]
-    picture = np.zeros((240, 320, 3), np.uint8)
-    draw_clicks(picture, np.array([[310.0, 100.0]]), np.array([[300.0, 110.0]]), ["c1"])
-    assert picture[60:100, 150:300].any(), "at the right edge the words are to the left of the mark"
+    image = np.zeros((240, 320, 3), np.uint8)
+    draw_clicks(image, np.array([[310.0, 100.0]]), np.array([[300.0, 110.0]]), ["c1"])
+    assert image[60:100, 150:300].any(), "at the right edge the words are to the left of the mark"
 
 
 def test_boxes_are_drawn_at_their_frames_only(view):
     boxed = dataclasses.replace(view, boxes=boxes_around(view.recording, (5,)))
     differs = [bool((composed(boxed, index) != composed(view, index)).any()) for index in (4, 5, 6)]
     assert differs == [False, True, False]
-    picture = np.zeros((240, 320, 3), np.uint8)
-    draw_boxes(picture, [Box(50.0, 60.0, 100.0, 120.0)], ("",))
-    assert picture[60, 75].any()
-    assert not picture[90, 75].any()
+    image = np.zeros((240, 320, 3), np.uint8)
+    draw_boxes(image, [Box(50.0, 60.0, 100.0, 120.0)], ("",))
+    assert image[60, 75].any()
+    assert not image[90, 75].any()
 
 
 def test_static_returns_are_dots_and_moving_ones_triangles():
-    picture = np.zeros((720, 1280, 3), np.uint8)
+    image = np.zeros((720, 1280, 3), np.uint8)
     places = np.array([[100.0, 100.0], [200.0, 100.0]])
-    draw_returns(picture, places, np.array([[10, 20, 250], [10, 20, 250]]), np.array([True, False]))
-    dot, triangle = ((picture[80:120, left : left + 40] == (250, 20, 10)).all(axis=2) for left in (80, 180))
+    draw_returns(image, places, np.array([[10, 20, 250], [10, 20, 250]]), np.array([True, False]))
+    dot, triangle = ((image[80:120, left : left + 40] == (250, 20, 10)).all(axis=2) for left in (80, 180))
     assert dot[20, 20]
     assert triangle[20, 20]
     assert abs(int(dot[:20].sum()) - int(dot[21:].sum())) <= 4

@@ -13,7 +13,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing import DwellView, PictureCandidate, ViewProgress
+from calib_core.proposing import DwellView, ImageCandidate, ViewProgress
 from cocalib import proposing
 from cocalib.proposing import (
     ProposingJob,
@@ -33,7 +33,7 @@ WISH = ProposingWish(DRAWN.camera, OPTIONS, STANDS)
 
 
 class Finding:
-    """What replaces looking at the pictures and carrying a look: it goes on as the test allows, and keeps what it was asked."""
+    """What replaces looking at the images and carrying a look: it goes on as the test allows, and keeps what it was asked."""
 
     def __init__(self) -> None:
         self.allowed = threading.Event()
@@ -107,7 +107,7 @@ def watched(finding: Finding) -> Iterator[Watched]:
     made.job.close()
 
 
-def test_first_proposals_come_while_the_pictures_are_looked_at(finding, watched):
+def test_first_proposals_come_while_the_images_are_looked_at(finding, watched):
     watched.job.ask(WISH)
     early = watched.until("looking", 8)
     assert early.proposals.ranked
@@ -149,7 +149,7 @@ def test_proposing_is_stopped_and_goes_on_without_looking_again(finding, watched
     assert finding.found == 1
 
 
-def test_with_another_camera_the_pictures_are_looked_at_again(finding, watched):
+def test_with_another_camera_the_images_are_looked_at_again(finding, watched):
     watched.job.ask(WISH)
     watched.until("looking", 8)
     watched.job.ask(replace(WISH, camera=draw_views(4).camera))
@@ -227,7 +227,7 @@ def test_a_search_that_is_stopped_proposes_nothing(after):
 
 
 def view_of(one: Placement, pixel_px: tuple[float, float]) -> DwellView:
-    candidate = PictureCandidate(np.array(pixel_px), 1.0, 20.0)
+    candidate = ImageCandidate(np.array(pixel_px), 1.0, 20.0)
     frames = np.arange(int(one.start) * 10 // NS_PER_S, int(one.end) * 10 // NS_PER_S)
     return DwellView(one, frames, one.start, np.full((48, 64, 3), 90, np.uint8), 1.0, (candidate,))
 

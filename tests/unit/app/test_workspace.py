@@ -278,13 +278,13 @@ def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path):
         workspace.close()
 
 
-def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing_and_one_without_radar_too_is_refused(
+def test_a_recording_without_images_can_be_looked_at_and_stores_nothing_and_one_without_radar_too_is_refused(
     tmp_path,
 ):
     recording = BareRecording()
     recording.image_times = np.zeros(0, dtype=np.int64)
     facts = recording_facts(recording, "drive")
-    assert not facts.has_pictures
+    assert not facts.has_images
     assert facts.moments.tolist() == recording.radar_times.tolist()
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="drive")
     assert [one.code for one in workspace.view.warnings] == ["no-camera"]
@@ -293,7 +293,7 @@ def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing_and_on
     workspace.close()
     assert not (tmp_path / "s").exists()
     recording.radar_times = recording.image_times
-    with pytest.raises(InputError, match="drive: has neither pictures nor radar scans"):
+    with pytest.raises(InputError, match="drive: has neither images nor radar scans"):
         recording_facts(recording, "drive")
 
 

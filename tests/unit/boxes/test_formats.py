@@ -59,7 +59,7 @@ def coco(names: list[str], bbox: Any = (100, 50, 40, 100), **image: Any) -> dict
         (["0002_cam0.png", "0010_cam0.png"], [1, 9]),
     ],
 )
-def test_coco_pictures_are_found_by_stamp_or_number(tmp_path, names, frames):
+def test_coco_images_are_found_by_stamp_or_number(tmp_path, names, frames):
     found = only_boxes(read(write(tmp_path, "instances.json", coco(names))))
 
     assert list(found) == frames
@@ -71,8 +71,8 @@ NAMED = [f"{number:06}" for number in (549, 600, 877, 1201, 1202, 1203, 1204, 12
 
 
 @pytest.mark.parametrize("kind", ["coco", "yolo"])
-def test_boxes_with_the_names_of_the_pictures_belong_to_them(tmp_path, kind):
-    """A subset of a data set: its numbers do not count the recorded frames; labels of other pictures are left out."""
+def test_boxes_with_the_names_of_the_images_belong_to_them(tmp_path, kind):
+    """A subset of a data set: its numbers do not count the recorded frames; labels of other images are left out."""
     names = [NAMED[2], NAMED[0], "004711"]
     if kind == "coco":
         path = write(tmp_path, "boxes.json", coco([f"image_2/{name}.png" for name in names]))
@@ -105,7 +105,7 @@ def test_coco_of_a_video_keeps_tracks(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["folder", "zip"])
-def test_yolo_folders_are_scaled_by_the_picture(tmp_path, kind):
+def test_yolo_folders_are_scaled_by_the_image(tmp_path, kind):
     folder = tmp_path / "data"
     write(folder, "data.yaml", "nc: 2\nnames: [car, person]\n")
     write(folder, "labels/000001.txt", "1 0.1875 0.208333333 0.0625 0.208333333 0.5 17\n")
@@ -208,7 +208,7 @@ def test_kitti_tracks_keep_pixels_and_count_frames_between_as_empty(tmp_path):
     assert found[2] == ()
 
 
-def test_kitti_objects_are_one_file_per_picture(tmp_path):
+def test_kitti_objects_are_one_file_per_image(tmp_path):
     write(tmp_path, "label_2/000000.txt", f"Car 0.00 0 1.85 100.0 50.0 140.0 150.0 {KITTI_3D} 0.25")
     write(tmp_path, "label_2/000004.txt", "Van 0 0 -10 1.0 2.0 3.0 4.0 -1 -1 -1 -1000 -1000 -1000 -10")
 
@@ -240,7 +240,7 @@ def test_openlabel_with_cuboids_alone_is_refused_not_read_as_empty(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["matrix", "quaternion"])
-def test_openlabel_cuboids_are_carried_to_the_camera_and_into_its_picture(tmp_path, form):
+def test_openlabel_cuboids_are_carried_to_the_camera_and_into_its_image(tmp_path, form):
     """The vehicle's x is ahead and z up; the camera is 1 m ahead of its origin and 2 m up, and looks ahead."""
     content = openlabel()
     root = content["openlabel"]
@@ -319,14 +319,14 @@ def nuscenes(folder: Path, **changed: Any) -> Path:
     """Write the tables of one keyframe of two cameras, with one car 10 m ahead of the vehicle, which drives north at (5, 50)."""
     poses = {"translation": [1, 0, 2], "rotation": [0.5, -0.5, 0.5, -0.5]}
     lens = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]
-    picture = {"sample_token": "s", "ego_pose_token": "e", "calibrated_sensor_token": "c", "is_key_frame": True}
-    picture |= {"timestamp": 1_700_000_000_200_000, "width": 640, "height": 480}
+    image = {"sample_token": "s", "ego_pose_token": "e", "calibrated_sensor_token": "c", "is_key_frame": True}
+    image |= {"timestamp": 1_700_000_000_200_000, "width": 640, "height": 480}
     half = math.sqrt(0.5)
     tables = {
         "sample_data": [
-            picture | {"token": "front", "filename": "samples/CAM_FRONT/n__CAM_FRONT__1700000000200000.jpg"},
-            picture | {"token": "back", "filename": "samples/CAM_BACK/n__CAM_BACK__1700000000200000.jpg"},
-            picture | {"token": "sweep", "filename": "sweeps/CAM_FRONT/x.jpg", "is_key_frame": False},
+            image | {"token": "front", "filename": "samples/CAM_FRONT/n__CAM_FRONT__1700000000200000.jpg"},
+            image | {"token": "back", "filename": "samples/CAM_BACK/n__CAM_BACK__1700000000200000.jpg"},
+            image | {"token": "sweep", "filename": "sweeps/CAM_FRONT/x.jpg", "is_key_frame": False},
             {"token": "radar", "filename": "samples/RADAR_FRONT/r.pcd", "is_key_frame": True, "width": 0},
         ],
         "calibrated_sensor": [{"token": "c", "sensor_token": "k", "camera_intrinsic": lens, **poses}],
@@ -349,7 +349,7 @@ def nuscenes(folder: Path, **changed: Any) -> Path:
     return folder
 
 
-def test_nuscenes_cuboids_are_carried_from_the_map_into_the_pictures_of_the_recorded_camera(tmp_path):
+def test_nuscenes_cuboids_are_carried_from_the_map_into_the_images_of_the_recorded_camera(tmp_path):
     names = [f"n__CAM_FRONT__{time // 1000}" for time in TIMES]
     found = only_boxes(read_boxes(nuscenes(tmp_path), image_times=TIMES, image_size_px=SIZE, image_names=names))
     assert list(found) == [2]
@@ -370,7 +370,7 @@ def test_nuscenes_cuboids_are_carried_from_the_map_into_the_pictures_of_the_reco
         ({"calibrated_sensor": [{"token": "c", "translation": [0] * 3, "rotation": [1, 0, 0, 0]}]}, "camera_intrinsic"),
         ({"ego_pose": [{"token": "e"}, 7]}, "something else after 1 of them"),
         ({"ego_pose": [{"token": 7}]}, "a list of rows with a token each"),
-        ({"sample_data": []}, "none of its 0 pictures of keyframes is a recorded frame"),
+        ({"sample_data": []}, "none of its 0 images of keyframes is a recorded frame"),
     ],
 )
 def test_nuscenes_tables_that_do_not_fit_are_refused(tmp_path, changed, words):
@@ -422,8 +422,8 @@ OTHER = "is it of another recording?"
         (coco([f"{START_NS - 10**12}.png"]), OTHER),
         (coco([f"{TIMES[3] + 40_000_000}.png"]), OTHER),
         (coco(["000400.png", "000000.png"]), "frames numbered 0 to 400, which do not fit the recording's 10 frames"),
-        (coco(["0.png"], width=1920, height=1080), "made on pictures of 1920 x 1080 px"),
-        (coco(["0.png"], bbox=(1000, 50, 40, 100)), "1 of 1 boxes lie outside the picture of 640 x 480 px"),
+        (coco(["0.png"], width=1920, height=1080), "made on images of 1920 x 1080 px"),
+        (coco(["0.png"], bbox=(1000, 50, 40, 100)), "1 of 1 boxes lie outside the image of 640 x 480 px"),
         (coco(["0.png"], bbox=(100, 50, -40, 100)), "annotations[0].bbox: the right or lower edge"),
         (coco(["0.png"], bbox=(100, 50, "wide", 100)), "annotations[0].bbox: expected a number, found 'wide'"),
         (

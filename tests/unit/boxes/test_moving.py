@@ -17,7 +17,7 @@ def times(count: int) -> np.ndarray:
 
 
 def walker(index: int, count: int) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom of a thing that crosses the picture; the last two are the first pixels outside."""
+    """Return left, top, right and bottom of a thing that crosses the image; the last two are the first pixels outside."""
     left = round((WIDTH - 20) * index / (count - 1))
     return left, 40, left + 12, 80
 
@@ -55,7 +55,7 @@ def test_a_thing_that_moves_is_boxed_and_keeps_its_track(changes):
         assert (box.label, box.track) == ("moving", "1")
 
 
-def test_pictures_are_reduced_and_boxes_are_in_recorded_pixels():
+def test_images_are_reduced_and_boxes_are_in_recorded_pixels():
     count = 10
 
     def image(index: int) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_too_few_frames_are_refused():
         changed_boxes(lambda index: scene_image(index, 3), times(3))
 
 
-def test_pictures_in_which_nothing_moves_are_refused():
+def test_images_in_which_nothing_moves_are_refused():
     still = SCENE.astype(np.uint8)
 
     with pytest.raises(InputError, match="nothing moves in 10 frames"):

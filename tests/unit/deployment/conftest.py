@@ -1,4 +1,4 @@
-"""Recordings with pictures and returns, a calibration of them, and readers that are not ours."""
+"""Recordings with images and returns, a calibration of them, and readers that are not ours."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ RECORDED = Camera(
 SEEING = Camera(
     "plumb_bob", 64, 48, np.array([[50.0, 0, 31.5], [0, 51, 23.5], [0, 0, 1]]), np.array([-0.1, 0.02, 0.001, -0.002])
 )
-"""Intrinsics with which the pictures show something."""
+"""Intrinsics with which the images show something."""
 
 
 def calibration_file(

@@ -153,9 +153,9 @@ def test_transform_and_intrinsics_carry_the_check_point_to_its_pixel(ros, rows, 
 
 def test_each_frame_has_intrinsics_of_its_stamp(ros, rows, write):
     written = exported(write(ros, without_info(rows(ros))), calibration_file())
-    pictures, infos = written.on("/camera/image/compressed"), written.on("/camera/camera_info")
-    assert [str(one.decoded.header.stamp) for one in infos] == [str(one.decoded.header.stamp) for one in pictures]
-    assert [one.log_time for one in infos] == [one.log_time for one in pictures]
+    images, infos = written.on("/camera/image/compressed"), written.on("/camera/camera_info")
+    assert [str(one.decoded.header.stamp) for one in infos] == [str(one.decoded.header.stamp) for one in images]
+    assert [one.log_time for one in infos] == [one.log_time for one in images]
     assert (infos[0].decoded.width, infos[0].decoded.height) == (64, 48)
     if ros.generation == 1:
         assert [one.decoded.header.seq for one in infos] == list(range(len(infos)))
@@ -289,7 +289,7 @@ def test_the_layout_holds_only_keys_of_foxglove_and_topics_of_the_file(ros, rows
     assert points.keys() <= layouts.BaseRendererPointCloudTopicSettings()._to_dict().keys()
 
 
-def test_a_calibration_of_other_pictures_is_refused(ros, rows, write):
+def test_a_calibration_of_other_images_is_refused(ros, rows, write):
     with pytest.raises(InputError, match=r"have 64 x 48 pixels.*camera with 128 x 96"):
         exported(write(ros, rows(ros)), calibration_file(SEEING.scaled(2)))
 
@@ -338,9 +338,9 @@ def test_memory_does_not_grow_with_the_recording(rows, write):
     camera = SEEING.scaled(10)
     peaks = []
     for frames in (20, 160):
-        picture = np.zeros((480, 1920), np.uint8)
+        image = np.zeros((480, 1920), np.uint8)
         times = range(START_NS, START_NS + frames * SECOND // 10, SECOND // 10)
-        some = [("/camera/image_raw", at, ros.image(at, picture, "bgr8", width=640)) for at in times]
+        some = [("/camera/image_raw", at, ros.image(at, image, "bgr8", width=640)) for at in times]
         clouds = [row for row in rows(ros, n=frames) if row[0] == "/radar/points"]
         path = write(ros, sorted(some + clouds, key=lambda row: row[1]), "mcap", f"long{frames}")
         sink = Sink()

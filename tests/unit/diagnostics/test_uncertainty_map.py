@@ -1,4 +1,4 @@
-"""The uncertainty in the picture as a map, against poses drawn from the covariance."""
+"""The uncertainty in the image as a map, against poses drawn from the covariance."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Input in other units, pictures and axes is named, whether or not a pose can be solved from it."""
+"""Input in other units, images and axes is named, whether or not a pose can be solved from it."""
 
 from dataclasses import replace
 

@@ -134,7 +134,7 @@ def test_targets_that_follow_one_another_can_have_one_box():
     assert matched(sightings((first, FAR), (then, FAR)), boxes(ACROSS)) == {0: {"o0"}, 1: {"o0"}}
 
 
-def test_a_target_elsewhere_is_without_a_box_and_counts_only_if_it_is_in_the_picture():
+def test_a_target_elsewhere_is_without_a_box_and_counts_only_if_it_is_in_the_image():
     inside, outside = np.full(FRAMES, -12.0), np.full(FRAMES, 50.0)
     found = sightings((ACROSS, FAR), (inside, FAR), (outside, FAR))
     matches = match_by_bearing(found, box_table(boxes(ACROSS)), CAMERA)

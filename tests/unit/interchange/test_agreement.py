@@ -233,14 +233,14 @@ def test_another_lens_is_found_and_named_with_its_part_of_the_difference(file):
     assert "0 px rms by the pose alone" in str(report)
 
 
-def test_pictures_of_another_size_are_another_camera(file):
+def test_images_of_another_size_are_another_camera(file):
     camera = file.calibration.camera
     double = Camera(camera.model, 2 * camera.width_px, camera.height_px, camera.matrix_px, camera.distortion)
 
     report = check(imported(seen_by(file, double)), against=imported(file))
 
     assert "other-lens" in error_codes(report)
-    assert f"pictures of {camera.width_px} x {camera.height_px} px and of {2 * camera.width_px} x" in str(report)
+    assert f"images of {camera.width_px} x {camera.height_px} px and of {2 * camera.width_px} x" in str(report)
 
 
 def test_a_limit_in_pixels_applies_to_the_lens(file):
@@ -264,7 +264,7 @@ def test_pairs_seen_by_another_camera_are_named(file):
 
 
 @pytest.mark.parametrize("name", ["kitti", "nuscenes"])
-def test_the_matrix_of_our_rectified_pictures_is_that_of_the_same_camera(file, name):
+def test_the_matrix_of_our_rectified_images_is_that_of_the_same_camera(file, name):
     written = read_any(export(file, name).data)
     k_px = np.array(written.matrix_px)
     assert abs(k_px[0, 0] - file.calibration.camera.matrix_px[0, 0]) > 20

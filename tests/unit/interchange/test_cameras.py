@@ -175,7 +175,7 @@ def test_a_missing_image_size_is_taken_from_the_recording():
 
     assert read_camera(text, image_size_px=(640, 480)).width_px == 640
     with pytest.raises(
-        InputError, match=r"principal point \(\d+, \d+\) is that of pictures of about 6\d\d x \d+ px, but these"
+        InputError, match=r"principal point \(\d+, \d+\) is that of images of about 6\d\d x \d+ px, but these"
     ):
         read_camera(text, image_size_px=(960, 720))
 
@@ -200,9 +200,9 @@ def test_what_opencv_writes_is_read(tmp_path):
 def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"absent\.yml: no such file or folder; check the path"):
         read_camera_file(tmp_path / "absent.yml")
-    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n\xff\xfe")
-    with pytest.raises(InputError, match=r"picture\.png: not a text file but a picture; .*looked for"):
-        read_camera_file(tmp_path / "picture.png")
+    (tmp_path / "image.png").write_bytes(b"\x89PNG\r\n\x1a\n\xff\xfe")
+    with pytest.raises(InputError, match=r"image\.png: not a text file but an image; .*looked for"):
+        read_camera_file(tmp_path / "image.png")
 
 
 @pytest.mark.real
@@ -218,7 +218,7 @@ def test_opencv_s_own_sample_intrinsics_are_read(shared_data):
     assert stereo.distortion[0] == -1.6916358306948096e-01
 
 
-def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_picture():
+def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_image():
     full = read_camera(ROS)
     part = read_camera(ROS + "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 40, y_offset: 20, width: 320, height: 240}\n")
     assert (part.width_px, part.height_px) == (160, 120)
@@ -383,7 +383,7 @@ def test_a_one_focal_model_of_colmap_has_two_equal_ones():
     assert camera.distortion.tolist() == [-0.1, 0.0, 0.0, 0.0]
 
 
-def test_a_camera_is_scaled_to_resized_pictures_on_request_only():
+def test_a_camera_is_scaled_to_resized_images_on_request_only():
     content = str(camera_content(typical_camera("plumb_bob", width_px=1280, height_px=720), "ros")).encode()
     half = CameraFile("c.yaml", content, rescale=True).camera(image_size_px=(640, 360))
     assert (half.width_px, half.height_px) == (640, 360)

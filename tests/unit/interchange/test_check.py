@@ -496,7 +496,7 @@ def test_being_the_file_of_a_guess_proves_nothing(guessed):
 
 @pytest.mark.parametrize("name", ["kitti", "nuscenes"])
 @pytest.mark.parametrize("rectified", [True, False])
-def test_another_matrix_in_a_file_of_rectified_pictures_misses_its_check_point(clicked, name, rectified):
+def test_another_matrix_in_a_file_of_rectified_images_misses_its_check_point(clicked, name, rectified):
     exported = export(clicked, name, rectified=rectified)
     found = read_any(exported.data)
     assert found.matrix_px is not None

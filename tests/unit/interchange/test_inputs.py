@@ -31,7 +31,7 @@ from calib_core.interchange.own.board_views_json import (
     write_board_views,
 )
 from calib_core.interchange.own.clicks_json import read_clicks_file
-from calib_core.interchange.own.lens_documents import PictureSource
+from calib_core.interchange.own.lens_documents import ImageSource
 from calib_core.intrinsics import BoardCorners, board_of_size
 from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
 from calib_core.options import CalibrationOptions
@@ -384,7 +384,7 @@ def test_clicks_say_which_topics_they_were_made_with_if_there_are_several():
 
 
 BOARD = board_of_size("9x6", 22.14)
-SOURCE = PictureSource("board.mp4", 9, 64 * "a")
+SOURCE = ImageSource("board.mp4", 9, 64 * "a")
 
 
 def kept() -> BoardViews:
@@ -413,12 +413,12 @@ def test_views_come_back_as_they_were():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda document: document["views"][0].update(index=9), r"views\[0\].index: 9 of 9 pictures"),
+        (lambda document: document["views"][0].update(index=9), r"views\[0\].index: 9 of 9 images"),
         (lambda document: document["views"][1].update(corner_ids=[0, 7, 54]), "be below 54"),
         (lambda document: document["views"][1].update(corner_ids=[7, 0, 5]), "must ascend"),
-        (lambda document: document["views"][1].update(index=1), "two are of the same picture"),
-        (lambda document: document["views"][1]["pixels_px"].__setitem__(0, [900, 5]), "outside its picture"),
-        (lambda document: document.update(searched=[[3, 20]]), r"searched\[0\]: 3 to 20 of 9 pictures"),
+        (lambda document: document["views"][1].update(index=1), "two are of the same image"),
+        (lambda document: document["views"][1]["pixels_px"].__setitem__(0, [900, 5]), "outside its image"),
+        (lambda document: document.update(searched=[[3, 20]]), r"searched\[0\]: 3 to 20 of 9 images"),
         (lambda document: document.update(serched=[]), "unknown key"),
     ],
 )
@@ -429,11 +429,11 @@ def test_a_file_that_cannot_be_right_is_refused(change, words):
         read_board_views(json.dumps(document), "views.json")
 
 
-def test_views_of_another_board_or_of_other_pictures_are_refused():
+def test_views_of_another_board_or_of_other_images_are_refused():
     with pytest.raises(InputError, match=r"22\.14 mm, but the board is a checkerboard of 8 x 6"):
         kept().require_same(board_of_size("8x6", 22.14), SOURCE, file="views.json")
-    with pytest.raises(InputError, match="give the same pictures"):
-        kept().require_same(BOARD, PictureSource("board.mp4", 9, 64 * "b"), file="views.json")
+    with pytest.raises(InputError, match="give the same images"):
+        kept().require_same(BOARD, ImageSource("board.mp4", 9, 64 * "b"), file="views.json")
 
 
 PINHOLE = read_pairs(pairs_text({"id": "p1", "radar_m": [5, 1, 0], "pixel_px": [1, 2]})).camera

@@ -1,4 +1,4 @@
-"""Formats that store only a camera matrix get that of rectified pictures, with maps that make them, or the declared one."""
+"""Formats that store only a camera matrix get that of rectified images, with maps that make them, or the declared one."""
 
 import dataclasses
 import io
@@ -92,7 +92,7 @@ def test_the_maps_are_opencv_s_for_that_matrix_and_leave_no_border_empty(file, m
     np.testing.assert_allclose([map_x, map_y], theirs, rtol=0, atol=2e-3)
     assert min(map_x.min(), map_y.min()) > -0.51
     assert (map_x.max(), map_y.max()) < (639.51, 479.51)
-    # and no larger picture is: a border of the picture as taken is used on each side
+    # and no larger image is: a border of the image as taken is used on each side
     edges = (map_x[:, 0].min(), map_y[0].min(), 639 - map_x[:, -1].max(), 479 - map_y[-1].max())
     assert max(edges) < 1.0
 
@@ -111,19 +111,19 @@ def test_the_matrix_is_that_of_opencv_s_alpha_0(file):
     np.testing.assert_allclose(maps_of(distorted, "kitti")[2], theirs, rtol=0.01, atol=0.5)
 
 
-def test_a_lens_that_folds_back_within_the_picture_gives_a_smaller_field_and_none_at_the_centre_is_refused(file):
+def test_a_lens_that_folds_back_within_the_image_gives_a_smaller_field_and_none_at_the_centre_is_refused(file):
     folding = through(file, "plumb_bob", [-0.9, 0.0, 0.0, 0.0])
     map_x, map_y, matrix_px = maps_of(folding, "kitti")
     assert matrix_px[0, 0] > 554.5
     assert np.isfinite([map_x, map_y]).all()
     corners = np.array([[0, 0, 1], [639, 0, 1], [0, 479, 1], [639, 479, 1.0]]) @ np.linalg.inv(matrix_px).T
     assert folding.calibration.camera.sees(corners).all()
-    with pytest.raises(InputError, match="no rectified picture can be cut from this lens"):
+    with pytest.raises(InputError, match="no rectified image can be cut from this lens"):
         export(through(file, "plumb_bob", [-5000.0, 0.0, 0.0, 0.0]), "kitti")
 
 
 @pytest.mark.parametrize("name", MATRIX_ONLY)
-def test_a_distorted_lens_is_written_with_the_matrix_of_pictures_that_its_maps_rectify(file, name):
+def test_a_distorted_lens_is_written_with_the_matrix_of_images_that_its_maps_rectify(file, name):
     written = export(file, name)
 
     found = read_any(written.data)
@@ -147,15 +147,15 @@ def test_a_lens_without_distortion_is_written_without_a_note(file, name, model, 
 
 
 @pytest.mark.parametrize("name", MATRIX_ONLY)
-def test_for_rectified_pictures_it_is_written_and_a_note_says_so(file, name):
+def test_for_rectified_images_it_is_written_and_a_note_says_so(file, name):
     written = export(file, name, rectified=True)
 
-    assert any("written for rectified pictures" in note for note in written.notes)
+    assert any("written for rectified images" in note for note in written.notes)
     assert check(read_any(written.data), against=imported(file)).verdict == "right"
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_a_format_that_is_not_for_rectified_pictures_refuses_the_option(file, name):
+def test_a_format_that_is_not_for_rectified_images_refuses_the_option(file, name):
     with pytest.raises(InputError, match=rf"that cannot store distortion \(kitti, nuscenes\), not to {name}"):
         export(file, name, rectified=True)
 
@@ -170,7 +170,7 @@ def matrix_in(name: str, data: bytes) -> np.ndarray:
 
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 @pytest.mark.parametrize("name", MATRIX_ONLY)
-def test_its_numbers_project_the_check_point_to_its_pixel_in_the_rectified_picture(file, name, model):
+def test_its_numbers_project_the_check_point_to_its_pixel_in_the_rectified_image(file, name, model):
     distorted = through(file, model, [-0.39, 0.17, -0.004, 0.002])
     check_point, camera = distorted.check_point, distorted.calibration.camera
     written = export(distorted, name, rectified=True).data
@@ -190,7 +190,7 @@ def test_its_numbers_project_the_check_point_to_its_pixel_in_the_rectified_pictu
     assert np.linalg.norm(seen[:2] / seen[2] - check_point.pixel_px) > 0.5
 
 
-def test_an_address_may_say_that_the_pictures_are_rectified(file):
+def test_an_address_may_say_that_the_images_are_rectified(file):
     assert exported(file, "kitti", "rectified=1").data == export(file, "kitti", rectified=True).data
     assert exported(file, "kitti", "rectified=0").data == exported(file, "kitti", "").data == export(file, "kitti").data
     for query, words in (("rectified=", "1"), ("rectified=yes", "'yes'")):
@@ -203,7 +203,7 @@ def test_the_page_knows_which_formats_ask_for_it(file):
     said = export_preview(file, "nuscenes", "parent_from_radar=1,0,0,0,0,0,1&rectified=1", "drive")
     assert said.is_for_rectified
     assert said.check_is_good
-    assert any("rectified pictures" in note for note in said.notes)
+    assert any("rectified images" in note for note in said.notes)
     with_maps = export_preview(file, "kitti", "", "drive")
     assert (with_maps.file_name, with_maps.is_binary) == ("drive_calib_and_maps.zip", True)
     assert with_maps.text.startswith("P0: ")
@@ -211,10 +211,10 @@ def test_the_page_knows_which_formats_ask_for_it(file):
     assert not export_preview(file, "tf2", "", "drive").is_for_rectified
 
 
-def test_a_matrix_without_a_size_is_not_that_of_pictures_twice_as_large(file, tmp_path):
+def test_a_matrix_without_a_size_is_not_that_of_images_twice_as_large(file, tmp_path):
     found, path = read_any(export(file, "kitti").data), tmp_path / "calib.txt"
     size_px = (file.calibration.camera.width_px, file.calibration.camera.height_px)
 
     assert camera_of(found, path, size_px).width_px == size_px[0]
-    with pytest.raises(InputError, match=r"calib.txt: the principal point \(\d+, \d+\) is that of pictures of about"):
+    with pytest.raises(InputError, match=r"calib.txt: the principal point \(\d+, \d+\) is that of images of about"):
         camera_of(found, path, (2 * size_px[0], 2 * size_px[1]))

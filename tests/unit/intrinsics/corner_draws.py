@@ -39,7 +39,7 @@ class Errors:
 
 
 def drawn_views(camera: Camera, count: int, seed: int, errors: Errors | None = None) -> tuple[BoardCorners, ...]:
-    """Draw views in which all corners are in the picture."""
+    """Draw views in which all corners are in the image."""
     rng, wrong = np.random.default_rng(seed), errors or Errors()
     board_m = BOARD.corners_m.copy()
     board_m[:, 2] += wrong.bend_m * (1.0 - (2.0 * board_m[:, 0] / board_m[:, 0].max() - 1.0) ** 2)
@@ -55,7 +55,7 @@ def drawn_views(camera: Camera, count: int, seed: int, errors: Errors | None = N
 
 
 def _pose(camera: Camera, board_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the corners (n, 3) in the camera frame, the board's middle somewhere in the picture."""
+    """Return the corners (n, 3) in the camera frame, the board's middle somewhere in the image."""
     tilt_x, tilt_y = rng.uniform(-0.7, 0.7, 2)
     rotation = rotation_exp(np.array([tilt_x, 0.0, 0.0])) @ rotation_exp(np.array([0.0, tilt_y, 0.0]))
     rotation = rotation @ rotation_exp(np.array([0.0, 0.0, rng.normal(0.0, 0.2)]))

@@ -257,13 +257,13 @@ def test_no_good_view_and_no_good_corner_is_dropped(errors):
     assert all(view.used.all() for view in lens.views)
 
 
-def test_a_mirrored_picture_is_called_mirrored():
+def test_a_mirrored_image_is_called_mirrored():
     camera = CAMERAS["plumb_bob"]
     off_middle = camera.with_parameters(camera.parameters - [0, 0, 80, 0, 0, 0, 0, 0, 0])
     good = drawn_views(off_middle, 12, 11)
     mirrored = good[3].pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0]
     lens = solved(*good, planted(good[3], mirrored, "mirror"))
-    assert [picture.name for picture in lens.left_out] == ["mirror"]
+    assert [image.name for image in lens.left_out] == ["mirror"]
     assert lens.left_out[0].reason.startswith("mirrored: with left and right exchanged its corners fit to 0.1")
 
 
@@ -287,7 +287,7 @@ def test_of_two_mirror_images_the_mirrored_one_is_named_though_the_lens_is_symme
     good = drawn_views(camera.with_parameters(parameters), 12, 11)
     twin = good[3].pixels_px * [-1.0, 1.0] + [2.0 * middle, 0.0]
     lens = solved(*good, planted(good[3], twin, "mirror"))
-    assert [picture.name for picture in lens.left_out] == ["mirror"]
+    assert [image.name for image in lens.left_out] == ["mirror"]
     assert lens.left_out[0].reason.startswith("mirrored: ")
 
 
@@ -306,14 +306,14 @@ def test_a_board_with_other_squares_is_called_another_board():
     pose = solved(*GOOD).views[2].camera_from_board
     other = camera.project(pose @ (BOARD.corners_m * [1.0, 1.2, 1.0]))
     lens = solved(*GOOD, planted(GOOD[2], other, "other"))
-    assert [picture.name for picture in lens.left_out] == ["other"]
+    assert [image.name for image in lens.left_out] == ["other"]
     assert lens.left_out[0].reason.startswith("another board: its corners fit to")
     assert "0.83 times as wide as high" in lens.left_out[0].reason
 
 
 def test_a_wrong_detection_fits_no_pose():
     lens = solved(*GOOD, planted(GOOD[4], np.roll(GOOD[4].pixels_px, 1, axis=0), "rolled"))
-    assert [picture.name for picture in lens.left_out] == ["rolled"]
+    assert [image.name for image in lens.left_out] == ["rolled"]
     assert "another board, or a wrong detection" in lens.left_out[0].reason
 
 
@@ -325,7 +325,7 @@ def test_a_blurred_view_is_called_blurred():
         for n, view in enumerate(GOOD[:3])
     ]
     lens = solved(*sharp, *blurred)
-    assert [picture.name for picture in lens.left_out] == ["blurred 0", "blurred 1", "blurred 2"]
+    assert [image.name for image in lens.left_out] == ["blurred 0", "blurred 1", "blurred 2"]
     assert "blurred: edges are 3.0 px wide, those of the others 0.9 px" in lens.left_out[0].reason
 
 

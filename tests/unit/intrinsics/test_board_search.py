@@ -1,4 +1,4 @@
-"""The search: which pictures are looked at, which views are chosen, and what is said about the others."""
+"""The search: which images are looked at, which views are chosen, and what is said about the others."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from calib_core.intrinsics import (
     search_boards,
 )
 from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
-from calib_core.intrinsics.board_search import PictureOrder
+from calib_core.intrinsics.board_search import ImageOrder
 from calib_core.measurements import TimeNs, Unsolvable
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
@@ -46,7 +46,7 @@ def drawn(
 
 @dataclass
 class Drawn:
-    """Pictures that are drawn when they are asked for."""
+    """Images that are drawn when they are asked for."""
 
     draw: list[Callable[[], np.ndarray]]
     rate_hz: float | None = None
@@ -56,12 +56,12 @@ class Drawn:
         return len(self.draw)
 
     def name(self, index: int, /) -> str:
-        return f"picture {index}"
+        return f"image {index}"
 
     def time_ns(self, index: int, /) -> TimeNs | None:
         return None if self.rate_hz is None else TimeNs(round(index * 1e9 / self.rate_hz))
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         self.asked.append(index)
         return self.draw[index]()
 
@@ -70,13 +70,13 @@ def several() -> list[Callable[[], np.ndarray]]:
     return [lambda s=s, t=t: drawn(s, tilt=t) for s, t in ((0, 0.0), (25, 0.5), (50, 1.0), (60, 1.5), (10, 1.3))]
 
 
-def searched(pictures: Drawn, board: Board = BOARD) -> BoardSearch:
-    search = search_boards(pictures, board)
+def searched(images: Drawn, board: Board = BOARD) -> BoardSearch:
+    search = search_boards(images, board)
     assert isinstance(search, BoardSearch), search
     return search
 
 
-def test_every_picture_of_a_few_is_searched_and_every_good_one_chosen():
+def test_every_image_of_a_few_is_searched_and_every_good_one_chosen():
     told: list[SearchProgress] = []
     search = search_boards(Drawn(several()), BOARD, progress=told.append)
     assert [view.index for view in search.views] == [0, 1, 2, 3, 4]
@@ -102,7 +102,7 @@ def test_what_is_not_used_is_named_with_the_reason():
     assert [view.index for view in search.views] == [0, 1, 2, 3, 4]
     reasons = {one.index: one.reason for one in search.left_out}
     assert reasons[5].startswith("blurred: edges are ")
-    assert reasons[6].startswith("the same view as picture 2")
+    assert reasons[6].startswith("the same view as image 2")
     assert reasons[7] == "it cannot be read: the file is cut off"
     assert "is seen in it as a whole" in reasons[8]
     assert reasons[9] == "it shows a board of 7 x 5 inner corners"
@@ -133,7 +133,7 @@ def test_a_search_without_a_result_says_why(draw, why):
     assert search_boards(Drawn(draw), BOARD) == why
 
 
-def test_a_few_pictures_of_another_size_are_named_and_the_rest_is_used():
+def test_a_few_images_of_another_size_are_named_and_the_rest_is_used():
     search = searched(Drawn([*several(), lambda: drawn(size=(330, 250))]))
     assert len(search.views) == 5
     assert search.left_out[0].reason == "it has 330 x 250 pixels, not 320 x 240"
@@ -155,50 +155,50 @@ def test_a_cancelled_search_goes_on_where_it_ended():
 def test_a_long_recording_is_searched_where_the_board_is(monkeypatch):
     shown = range(30_000, 31_800)  # a minute of half an hour
 
-    def find(picture: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray] | None:
-        number = int(picture[0, 0, 0])
+    def find(image: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray] | None:
+        number = int(image[0, 0, 0])
         return (np.arange(20), board.corners_m[:, :2] * 1e3 + [number % 97, number % 89]) if number in shown else None
 
     monkeypatch.setattr(board_search, "find_board", find)
     monkeypatch.setattr(board_search, "blur_px", lambda *_: 1.0)
     draw = [lambda index=index: np.full((4, 4, 1), index, dtype=np.int64) for index in range(54_000)]
-    pictures = Drawn(draw, rate_hz=30.0)
-    search = searched(pictures)
-    assert len(pictures.asked) <= 420
-    assert len([index for index in pictures.asked if index in shown]) > 100
+    images = Drawn(draw, rate_hz=30.0)
+    search = searched(images)
+    assert len(images.asked) <= 420
+    assert len([index for index in images.asked if index in shown]) > 100
     assert 30 <= len(search.views) <= 60
     assert not any("as a whole" in one.reason for one in search.left_out)
 
 
 def test_a_search_for_a_board_that_is_another_one_ends_early():
     other = Board("checkerboard", 6, 4, 0.03)
-    pictures = Drawn([lambda: drawn(board=other)] * 100)
-    found = search_boards(pictures, BOARD)
+    images = Drawn([lambda: drawn(board=other)] * 100)
+    found = search_boards(images, BOARD)
     assert found.code == "other-board"
-    assert len(pictures.asked) < 50
+    assert len(images.asked) < 50
 
 
-def test_one_picture_that_seems_to_show_the_board_does_not_hide_that_the_others_show_another():
+def test_one_image_that_seems_to_show_the_board_does_not_hide_that_the_others_show_another():
     other = Board("checkerboard", 6, 4, 0.03)
     found = search_boards(Drawn([drawn, *[lambda s=s: drawn(4.0 * s, board=other) for s in range(7)]]), BOARD)
     assert found.code == "other-board"
     assert (found.facts["searched"], found.facts["views"], found.facts["corners"]) == (8, 1, (6, 4))
 
 
-def test_a_copy_of_a_picture_is_the_same_view_and_no_less_sharp():
+def test_a_copy_of_a_image_is_the_same_view_and_no_less_sharp():
     search = searched(Drawn([*several(), several()[2]]))
-    assert [(one.index, one.reason) for one in search.left_out] == [(5, "the same view as picture 2")]
+    assert [(one.index, one.reason) for one in search.left_out] == [(5, "the same view as image 2")]
 
 
-def test_the_first_pictures_of_a_long_recording_are_far_apart():
-    order = PictureOrder(54_000, lambda index: TimeNs(index * 33_333_333))
+def test_the_first_images_of_a_long_recording_are_far_apart():
+    order = ImageOrder(54_000, lambda index: TimeNs(index * 33_333_333))
     first = order.next_batch(())[:8]
     assert min(abs(a - b) for number, a in enumerate(first) for b in first[:number]) > 4_000
     assert order.next_batch(()) == []
-    assert PictureOrder(0, lambda _: None).next_batch(()) == []
+    assert ImageOrder(0, lambda _: None).next_batch(()) == []
 
 
-# Boards in rendered pictures, whose corners are known.
+# Boards in rendered images, whose corners are known.
 
 
 CHECKERBOARD = Board("checkerboard", 9, 6, 0.02214)
@@ -212,7 +212,7 @@ def camera_of(model: CameraModel = "plumb_bob") -> Camera:
 
 
 def views(board: Board, film: BoardFilm, count: int, model: CameraModel = "plumb_bob", seed: int = 3):
-    """Yield pictures and the true corners of each by id."""
+    """Yield images and the true corners of each by id."""
     camera = camera_of(model)
     for number, pose in enumerate(waved_poses(np.random.default_rng(seed), board, camera, count)):
         yield render_board(board, camera, pose, film, seed=number), true_corners(board, camera, pose, film)
@@ -226,8 +226,8 @@ def apart(found: np.ndarray, true: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(model):
     errors = []
-    for picture, true in views(CHECKERBOARD, FILM, 5, model):
-        found = find_board(picture, CHECKERBOARD)
+    for image, true in views(CHECKERBOARD, FILM, 5, model):
+        found = find_board(image, CHECKERBOARD)
         errors.append(apart(found[1], true))
     assert np.sqrt(np.mean(np.square(errors))) < 0.03
     assert np.abs(errors).max() < 0.2
@@ -237,8 +237,8 @@ def test_light_that_falls_off_to_one_side_does_not_move_corners():
     film = replace(FILM, gradient=(0.35, -0.2), vignetting=0.4)
     errors = [
         apart(found[1], true)
-        for picture, true in views(CHECKERBOARD, film, 4)
-        if (found := find_board(picture, CHECKERBOARD))
+        for image, true in views(CHECKERBOARD, film, 4)
+        if (found := find_board(image, CHECKERBOARD))
     ]
     assert len(errors) == 4
     assert np.sqrt(np.mean(np.square(errors))) < 0.02
@@ -247,8 +247,8 @@ def test_light_that_falls_off_to_one_side_does_not_move_corners():
 
 @pytest.mark.parametrize("board", [CHARUCO, APRILGRID], ids=["charuco", "aprilgrid"])
 def test_boards_with_markers_say_which_corner_is_which(board):
-    for picture, true in views(board, FILM, 2):
-        found = find_board(picture, board)
+    for image, true in views(board, FILM, 2):
+        found = find_board(image, board)
         assert found is not None
         ids, pixels = found
         assert len(ids) > 0.7 * len(true)
@@ -258,13 +258,13 @@ def test_boards_with_markers_say_which_corner_is_which(board):
 
 
 def test_tags_whose_outline_runs_into_the_squares_between_them_get_their_corners():
-    """In small pictures the outline of a tag ends pixels away from its corner, for a third of the corners at once."""
+    """In small images the outline of a tag ends pixels away from its corner, for a third of the corners at once."""
     board = Board("aprilgrid", 6, 6, 0.03, 0.009, "DICT_APRILTAG_36h11")
     camera = typical_camera("plumb_bob", width_px=640, height_px=480)
     poses = list(waved_poses(np.random.default_rng(3), board, camera, 12))
     for number in (0, 9):
-        picture = render_board(board, camera, poses[number], FILM, seed=number)
-        found = find_board(picture, board)
+        image = render_board(board, camera, poses[number], FILM, seed=number)
+        found = find_board(image, board)
         assert found is not None
         ids, pixels = found
         assert len(ids) >= 36
@@ -273,10 +273,10 @@ def test_tags_whose_outline_runs_into_the_squares_between_them_get_their_corners
 
 @pytest.mark.parametrize("board", [CHARUCO, APRILGRID], ids=["charuco", "aprilgrid"])
 def test_a_part_of_a_board_with_markers_suffices(board):
-    picture, true = next(views(board, FILM, 1))
-    hidden = picture.copy()
+    image, true = next(views(board, FILM, 1))
+    hidden = image.copy()
     hidden[:, : int(np.median(true[:, 0]))] = 120
-    whole, part = find_board(picture, board), find_board(hidden, board)
+    whole, part = find_board(image, board), find_board(hidden, board)
     assert 6 <= len(part[0]) < len(whole[0])
     assert np.abs(part[1] - true[part[0]]).max() < 0.5
 
@@ -284,26 +284,26 @@ def test_a_part_of_a_board_with_markers_suffices(board):
 def test_a_grid_of_opencvs_tags_is_found_though_they_are_turned():
     board = Board("aprilgrid", 3, 2, 0.05, 0.015, "DICT_APRILTAG_36h11")
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    picture = np.full((500, 700), 255, dtype=np.uint8)
+    image = np.full((500, 700), 255, dtype=np.uint8)
     corners = board.corners_m[:, :2] * 3000.0 + 80.0
     for tag in range(6):
         left, top = corners[4 * tag].round().astype(int)
-        picture[top : top + 150, left : left + 150] = cv2.aruco.generateImageMarker(dictionary, tag, 150, borderBits=2)
-    found = find_board(picture, board)
+        image[top : top + 150, left : left + 150] = cv2.aruco.generateImageMarker(dictionary, tag, 150, borderBits=2)
+    found = find_board(image, board)
     assert len(found[0]) == 24
     assert np.abs(found[1] - (corners[found[0]] - 0.5)).max() < 1.0
 
 
 def test_a_checkerboard_is_numbered_with_a_right_hand():
-    picture, _ = next(views(CHECKERBOARD, FILM, 1))
-    for shown in (picture, cv2.rotate(picture, cv2.ROTATE_90_CLOCKWISE), cv2.rotate(picture, cv2.ROTATE_180)):
+    image, _ = next(views(CHECKERBOARD, FILM, 1))
+    for shown in (image, cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE), cv2.rotate(image, cv2.ROTATE_180)):
         found = find_board(shown, CHECKERBOARD)
         grid = found[1].reshape(6, 9, 2)
         along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
         assert along[0] * down[1] - along[1] * down[0] > 0.0
 
 
-def test_a_large_picture_is_searched_small_and_refined_large():
+def test_a_large_image_is_searched_small_and_refined_large():
     camera = typical_camera("plumb_bob", width_px=2560, height_px=1440)
     pose = waved_poses(np.random.default_rng(4), CHECKERBOARD, camera, 1)[0]
     found = find_board(render_board(CHECKERBOARD, camera, pose, FILM, seed=1), CHECKERBOARD)
@@ -311,40 +311,40 @@ def test_a_large_picture_is_searched_small_and_refined_large():
 
 
 def test_a_part_of_a_larger_board_is_not_the_board():
-    picture, _ = next(views(CHECKERBOARD, FILM, 1))
+    image, _ = next(views(CHECKERBOARD, FILM, 1))
     for columns, rows in ((8, 6), (10, 7)):
-        assert find_board(picture, msgspec.structs.replace(CHECKERBOARD, columns=columns, rows=rows)) is None
-    assert board_in(picture, msgspec.structs.replace(CHECKERBOARD, columns=10, rows=7)) == (9, 6)
-    assert board_in(picture, CHECKERBOARD) is None
+        assert find_board(image, msgspec.structs.replace(CHECKERBOARD, columns=columns, rows=rows)) is None
+    assert board_in(image, msgspec.structs.replace(CHECKERBOARD, columns=10, rows=7)) == (9, 6)
+    assert board_in(image, CHECKERBOARD) is None
 
 
 def test_no_board_is_found_where_there_is_none():
     noise = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     stripes = np.tile(np.repeat(np.array([20, 230], dtype=np.uint8), 20), (480, 16))
-    for picture in (noise, stripes, np.zeros((480, 640, 3), dtype=np.uint8)):
+    for image in (noise, stripes, np.zeros((480, 640, 3), dtype=np.uint8)):
         for board in (CHECKERBOARD, CHARUCO, APRILGRID):
-            assert find_board(picture, board) is None
-        assert board_in(picture, CHECKERBOARD) is None
+            assert find_board(image, board) is None
+        assert board_in(image, CHECKERBOARD) is None
 
 
 @pytest.mark.parametrize("board", [CHECKERBOARD, CHARUCO, APRILGRID], ids=["checkerboard", "charuco", "aprilgrid"])
 def test_blur_is_measured_in_pixels(board):
     measured = []
     for blur in (0.7, 1.4, 2.0):
-        picture, true = next(views(board, BoardFilm(blur_px=blur), 1))
-        measured.append(blur_px(picture, np.arange(len(true)), true, board))
+        image, true = next(views(board, BoardFilm(blur_px=blur), 1))
+        measured.append(blur_px(image, np.arange(len(true)), true, board))
     assert measured == sorted(measured)
     known = 3 if board is CHECKERBOARD else 1  # markers leave less room beside an edge than strong blur takes
     np.testing.assert_allclose(measured[:known], np.hypot([0.7, 1.4, 2.0], 0.5)[:known], rtol=0.2)
 
 
 def test_motion_blurs_the_edges_across_it():
-    picture, true = next(views(CHECKERBOARD, FILM, 1))
+    image, true = next(views(CHECKERBOARD, FILM, 1))
     ids = np.arange(len(true))
-    still = blur_px(picture, ids, true, CHECKERBOARD)
-    moved = cv2.blur(picture, (9, 1))
+    still = blur_px(image, ids, true, CHECKERBOARD)
+    moved = cv2.blur(image, (9, 1))
     assert blur_px(moved, ids, true, CHECKERBOARD) > 1.8 * still
-    assert np.isnan(blur_px(np.full_like(picture, 90), ids, true, CHECKERBOARD))
+    assert np.isnan(blur_px(np.full_like(image, 90), ids, true, CHECKERBOARD))
 
 
 # Boards: where their corners are, and how they are named.

@@ -18,7 +18,7 @@ from calib_core.intrinsics import (
     split_difference,
     view_coverage,
 )
-from calib_core.intrinsics.picture_maps import far_point_slopes
+from calib_core.intrinsics.image_maps import far_point_slopes
 from calib_core.measurements import Unsolvable
 from calib_core.synthetic import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of
@@ -78,13 +78,13 @@ def test_corners_that_nothing_explains_are_no_calibration():
     assert answer.code in ("no-lens", "few-views", "parallel-views")
 
 
-def test_a_picture_of_another_size_is_left_out_by_name():
+def test_a_image_of_another_size_is_left_out_by_name():
     lens = calibrated(*VIEWS[:9], replace(VIEWS[9], size_px=(640, 480)))
-    (picture,) = lens.left_out
-    assert (picture.name, picture.reason) == ("view 9", "it has 640 x 480 pixels, not 1280 x 720")
+    (image,) = lens.left_out
+    assert (image.name, image.reason) == ("view 9", "it has 640 x 480 pixels, not 1280 x 720")
 
 
-def test_a_corner_of_the_picture_without_views_is_warned_about():
+def test_a_corner_of_the_image_without_views_is_warned_about():
     left = [view for view in drawn_views(CAMERAS["pinhole"], 60, 3) if view.pixels_px[:, 0].max() < 700.0]
     assert len(left) >= 5
     assert "little-covered" in {warning.code for warning in calibrated(*left).warnings}
@@ -97,7 +97,7 @@ def test_a_cancelled_calibration_says_so_and_named_its_steps():
     assert steps == ["comparing the views", "choosing a lens model"]
 
 
-def test_pictures_that_were_resized_out_of_proportion_show_in_the_focal_lengths():
+def test_images_that_were_resized_out_of_proportion_show_in_the_focal_lengths():
     squeezed = tuple(replace(view, pixels_px=view.pixels_px * [0.9, 1.0]) for view in VIEWS)
     codes = {warning.code for warning in calibrated(*squeezed).warnings}
     assert "unequal-focal-lengths" in codes
@@ -112,8 +112,8 @@ def test_pictures_that_were_resized_out_of_proportion_show_in_the_focal_lengths(
 )
 def test_a_view_that_cannot_be_posed_is_left_out_by_name(ids, reason):
     partial = replace(VIEWS[9], corner_ids=ids, pixels_px=VIEWS[9].pixels_px[ids])
-    (picture,) = calibrated(*VIEWS[:9], partial).left_out
-    assert (picture.name, picture.reason) == ("view 9", reason)
+    (image,) = calibrated(*VIEWS[:9], partial).left_out
+    assert (image.name, image.reason) == ("view 9", reason)
 
 
 def test_one_view_given_many_times_is_no_calibration():
@@ -168,7 +168,7 @@ def test_the_face_of_the_board_is_where_its_normal_points():
     assert covered(view).tilts["left" if nearer_right else "right"] == 1
 
 
-def test_distance_is_told_by_the_share_of_the_picture():
+def test_distance_is_told_by_the_share_of_the_image():
     assert covered(seen(at=(0, 0, 0.25))).distances["near"] == 1
     assert covered(seen(at=(0, 0, 0.45))).distances["middle"] == 1
     assert covered(seen(at=(0, 0, 0.9))).distances["far"] == 1
@@ -194,17 +194,17 @@ def test_counts_are_those_of_all_corners():
     assert covered().share == 0.0
 
 
-# What is shown over the picture: projection uncertainty, residuals, and halves of the views calibrated apart.
+# What is shown over the image: projection uncertainty, residuals, and halves of the views calibrated apart.
 
 
-def calibrated_over_the_picture(model: str, count: int = 12, *, truth: str = "") -> CalibratedLens:
+def calibrated_over_the_image(model: str, count: int = 12, *, truth: str = "") -> CalibratedLens:
     views = drawn_views(CAMERAS[truth or model], count, 9)
     lens = calibrate_lens(search_of(views), model)
     assert isinstance(lens, CalibratedLens), lens
     return lens
 
 
-LENS = calibrated_over_the_picture("pinhole")
+LENS = calibrated_over_the_image("pinhole")
 
 
 def test_the_slopes_of_far_points_are_those_of_their_pixels():
@@ -254,7 +254,7 @@ def test_a_pattern_that_all_views_share_is_more_than_noise():
 
 
 def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours():
-    field = residual_field(calibrated_over_the_picture("pinhole", 25, truth="plumb_bob"))
+    field = residual_field(calibrated_over_the_image("pinhole", 25, truth="plumb_bob"))
     assert field.neighbour_correlation > 0.5
     assert field.neighbours_alike
 

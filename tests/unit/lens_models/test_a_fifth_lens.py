@@ -147,7 +147,7 @@ def test_a_format_without_a_name_for_it_refuses_it_with_a_clear_error(file):
             export(file, name)
 
 
-def test_its_pictures_are_rectified_with_maps(file):
+def test_its_images_are_rectified_with_maps(file):
     camera = file.calibration.camera
     (maps,) = export(file, "kitti").extra_files
     arrays = np.load(io.BytesIO(maps.data), allow_pickle=False)

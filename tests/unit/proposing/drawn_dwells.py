@@ -1,4 +1,4 @@
-"""Small drawn pictures of dwells: a textured wall, a reflector of three sheets, and whoever stands about."""
+"""Small drawn images of dwells: a textured wall, a reflector of three sheets, and whoever stands about."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The apex of a reflector in pictures with a known apex, and the refusal where there is none."""
+"""The apex of a reflector in images with a known apex, and the refusal where there is none."""
 
 from dataclasses import replace
 
@@ -69,7 +69,7 @@ def test_an_apex_beyond_reach_is_not_taken():
     assert isinstance(find_apex(image, look.apex_px + np.array([18.0, 0.0]), reach_px=25.0), Apex)
 
 
-def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex():
+def test_turning_flipping_and_moving_the_image_turns_flips_and_moves_the_apex():
     look, behind, rng = _look()
     image = noisy_image(look, behind, rng)
     last = image.shape[1] - 1.0
@@ -93,7 +93,7 @@ def test_exposure_and_colour_do_not_move_the_apex():
     assert _found(coloured, look.apex_px + 3.0).pixel_px == pytest.approx(apex, abs=1e-6)
 
 
-def test_a_reflector_at_the_rim_of_the_picture_is_found_or_refused():
+def test_a_reflector_at_the_rim_of_the_image_is_found_or_refused():
     look, behind, rng = _look()
     image = noisy_image(look, behind, rng)
     column, row = (int(v) for v in look.apex_px)

@@ -1,4 +1,4 @@
-"""What changed in the pictures of dwells, in small drawn pictures with a known apex."""
+"""What changed in the images of dwells, in small drawn images with a known apex."""
 
 from dataclasses import dataclass, field, replace
 
@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from calib_core.errors import CalibrationError
 from calib_core.proposing import DwellView, ViewProgress, dwell_views
 from calib_core.proposing.dwell_views import averaged_over_dwell, reflector_width_px
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.look import Look, look_of, with_look
-from calib_core.proposing.picture_candidates import PictureCandidate
-from calib_core.proposing.still_pictures import frames_within, stack_median
+from calib_core.proposing.still_images import frames_within, stack_median
 from tests.unit.proposing.drawn_dwells import CAMERA, DrawnDwell, DrawnFrames, placements_of
 
 ONE_BY_ONE = tuple(
@@ -43,7 +43,7 @@ def test_the_reflector_is_the_strongest_candidate_at_its_apex_and_only_frames_of
     assert set(frames.asked) == {int(number) for view in views for number in view.frames}
 
 
-def test_candidates_move_with_the_pictures():
+def test_candidates_move_with_the_images():
     frames = DrawnFrames(ONE_BY_ONE, moved_px=(8, -4))
     assert max(first_errors_px(views_of(frames), frames)) < 1.0
 
@@ -103,7 +103,7 @@ def test_progress_brings_candidates_early_and_can_be_stopped():
     assert [bool(view.candidates) for view in views] == [True] * 4 + [False] * (len(views) - 4)
 
 
-def test_pictures_of_dwells_long_ago_are_forgotten_and_their_candidates_kept():
+def test_images_of_dwells_long_ago_are_forgotten_and_their_candidates_kept():
     dwells = [DrawnDwell(8.0 * k, 8.0 * k + 2.5, (60.3 + 6.0 * k, 60.8 + 70.0 * (k % 2))) for k in range(27)]
     views = views_of(DrawnFrames(dwells))
     assert [bool(view.stills) for view in views] == [False] * 3 + [True] * 24
@@ -172,7 +172,7 @@ def test_a_shaking_camera_is_followed_and_widens_the_sigma():
     assert found.sigma_px > 1.5 * still.sigma_px
 
 
-def test_frames_of_another_picture_do_not_enter():
+def test_frames_of_another_image_do_not_enter():
     shifts_px = {int(number): (25, 0) for number in NUMBERS[4:]}
     found = averaged_over_dwell(view(), Shaken(shifts_px), CLICKED, APEX_PX)
     assert found.frames == 4
@@ -224,8 +224,8 @@ def look_at(view: DwellView, pixel_px: tuple[float, float]) -> Look:
 
 def rough(view: DwellView, apex_px: tuple[float, float]) -> DwellView:
     """A view whose stronger candidate is a wrong one, and whose right one is a blob."""
-    wrong = PictureCandidate(np.array([180.0, 40.0]), 3.0, 30.0)
-    right = PictureCandidate(np.array(apex_px) + np.array([0.2 * view.width_px, -0.25 * view.width_px]), 3.0, 20.0)
+    wrong = ImageCandidate(np.array([180.0, 40.0]), 3.0, 30.0)
+    right = ImageCandidate(np.array(apex_px) + np.array([0.2 * view.width_px, -0.25 * view.width_px]), 3.0, 20.0)
     return replace(view, candidates=(wrong, right))
 
 
@@ -268,7 +268,7 @@ def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views):
     assert look_of(views[0], broken, np.array(LOOKED_AT.dwells[0].apex_px)) is None
 
 
-# The median of a few pictures against NumPy's.
+# The median of a few images against NumPy's.
 
 
 @given(st.integers(1, 14), st.integers(0, 2**32 - 1), st.sampled_from([np.uint8, np.uint16]))

@@ -18,7 +18,7 @@ from calib_core.options import CalibrationOptions, MountingOptions
 from calib_core.proposing import (
     AutomaticClicks,
     DwellView,
-    PictureCandidate,
+    ImageCandidate,
     Proposal,
     Proposals,
     automatic_clicks,
@@ -29,7 +29,7 @@ from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
 from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
 from calib_core.synthetic.rig import typical_camera
-from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
+from tests.drawn_views import Drawing, DrawnViews, draw_views, with_images_of
 
 OPTIONS = CalibrationOptions()
 
@@ -99,7 +99,7 @@ def test_one_click_makes_proposals_of_two_dwells_possible():
     assert all(right(drawn, proposed(drawn, (0,))))
 
 
-def test_the_proposed_pixel_is_always_a_candidate_of_the_picture():
+def test_the_proposed_pixel_is_always_a_candidate_of_the_image():
     drawn = draw_views(4)
     candidates = {view.placement.start: view.candidates for view in drawn.views}
     for one in proposed(drawn).ranked:
@@ -107,14 +107,14 @@ def test_the_proposed_pixel_is_always_a_candidate_of_the_picture():
         assert (one.pixel_px == one.candidates[0].pixel_px).all()
 
 
-def test_dwells_without_pictures_or_changes_say_so():
+def test_dwells_without_images_or_changes_say_so():
     drawn = draw_views(6)
     dark = replace(drawn.views[0], frames=np.zeros(0, np.int64), candidates=())
     same = replace(drawn.views[1], candidates=())
     proposals = proposals_of([dark, same, *drawn.views[2:]], drawn.camera, OPTIONS)
     reasons = {placement.start: reason for placement, reason in proposals.unproposed}
     assert reasons[dark.placement.start] == "the camera recorded no frame while it stood there"
-    assert reasons[same.placement.start] == "nothing of the reflector's size changed in the picture"
+    assert reasons[same.placement.start] == "nothing of the reflector's size changed in the image"
 
 
 def test_the_nominal_mounting_is_where_the_search_starts():
@@ -207,7 +207,7 @@ def view(one: Placement) -> DwellView:
 
 
 def proposal(one: Placement, confidence: float) -> Proposal:
-    candidate = PictureCandidate(np.array([30.0, 40.0]), 0.5, 12.0)
+    candidate = ImageCandidate(np.array([30.0, 40.0]), 0.5, 12.0)
     return Proposal(one, one.start, candidate.pixel_px, 0.5, confidence, (candidate,))
 
 
@@ -280,8 +280,8 @@ def test_clear_proposals_become_snapped_clicks_in_order_of_time():
         assert np.linalg.norm(drawn.pixels[rows[click.image_time]] - [click.u_px, click.v_px]) < 5.0 * click.sigma_px
 
 
-def test_the_radar_of_one_recording_with_the_pictures_of_another_is_refused_with_the_reason():
-    views = with_pictures_of(draw_views(1, Drawing(count=10)), draw_views(2, Drawing(count=10)))
+def test_the_radar_of_one_recording_with_the_images_of_another_is_refused_with_the_reason():
+    views = with_images_of(draw_views(1, Drawing(count=10)), draw_views(2, Drawing(count=10)))
     found = taken(views)
     assert found.code == "not-confident"
     assert found.facts["why"] == "chance"
@@ -317,7 +317,7 @@ def test_wrong_deals_of_the_radar_score_far_below_the_right_one():
 
 
 def test_a_person_who_stands_at_every_placement_is_refused_and_not_proposed():
-    """The radar and the pictures agree on the mounting, but no apex is seen although a reflector's would be."""
+    """The radar and the images agree on the mounting, but no apex is seen although a reflector's would be."""
     drawn = draw_views(1, Drawing(count=10, listed_share=1.0))
     near = tuple(replace(view, width_px=30.0) for view in drawn.views)
     assert not proposals_of(near, CAMERA, OPTIONS).ranked
@@ -333,7 +333,7 @@ def test_apexes_where_the_reflector_is_large_confirm_it():
     assert isinstance(taken(tuple(seen)), AutomaticClicks)
 
 
-def _with_apex(drawn: DrawnViews, row: int) -> tuple[PictureCandidate, ...]:
+def _with_apex(drawn: DrawnViews, row: int) -> tuple[ImageCandidate, ...]:
     candidates = drawn.views[row].candidates
     nearest = min(candidates, key=lambda one: float(np.linalg.norm(one.pixel_px - drawn.pixels[row])))
     return tuple(replace(one, has_apex=one is nearest) for one in candidates)

@@ -1,4 +1,4 @@
-"""Pictures of trihedral corner reflectors, ray by ray, made without the simulator.
+"""Images of trihedral corner reflectors, ray by ray, made without the simulator.
 
 Unlike the simulator's: any turn, three shapes of sheets, any three brightnesses, mirror-like streaks, backgrounds of blocks,
 lines and texture, lens blur, exposure, gamma, noise and JPEG.
@@ -48,7 +48,7 @@ def draw_look(rng: np.random.Generator, *, size_px: tuple[int, int], width_px: f
 
     Args:
         rng: the only source of randomness.
-        size_px: width and height of the picture.
+        size_px: width and height of the image.
         width_px: of the reflector; None draws 10 to 200 px.
     """
     width = float(np.exp(rng.uniform(np.log(10.0), np.log(200.0)))) if width_px is None else width_px
@@ -85,7 +85,7 @@ def _axes(rng: np.random.Generator) -> np.ndarray:
 
 
 def noisy_image(look: Look, behind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the picture as grey levels (h, w) uint8.
+    """Return the image as grey levels (h, w) uint8.
 
     Args:
         look: how the reflector is seen.

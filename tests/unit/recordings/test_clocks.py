@@ -199,13 +199,13 @@ def test_a_few_zero_stamps_are_filled_in_from_the_delay_of_the_others(ros1, writ
 
 
 def test_types_without_stamps_cannot_use_the_header_clock(ros1, write, plain, jpeg):
-    ros1.define("bare_msgs/msg/Picture", "string format\nuint8[] data\n")
+    ros1.define("bare_msgs/msg/Image", "string format\nuint8[] data\n")
     rows = plain(ros1, jpeg)
     rows = [
         (
             topic,
             at,
-            ros1.new("bare_msgs/msg/Picture", format="jpeg", data=message.data) if "image" in topic else message,
+            ros1.new("bare_msgs/msg/Image", format="jpeg", data=message.data) if "image" in topic else message,
         )
         for topic, at, message in rows
     ]

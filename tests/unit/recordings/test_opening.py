@@ -119,8 +119,8 @@ def test_reading_from_many_threads_gives_every_frame_its_own_bytes(container, co
 
     rows, files = [], []
     for i in range(40):
-        picture = np.full((16, 16, 3), 6 * i, dtype=np.uint8)
-        files.append(cv2.imencode(".png", picture)[1].tobytes())
+        image = np.full((16, 16, 3), 6 * i, dtype=np.uint8)
+        files.append(cv2.imencode(".png", image)[1].tobytes())
         at = START_NS + i * 100_000_000
         rows.append(("/camera/image", at, container_ros.compressed(at, files[-1], "png")))
     path = write(container_ros, rows, container)

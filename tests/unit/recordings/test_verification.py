@@ -18,9 +18,9 @@ from tests.unit.recordings.containers.damage import KINDS, damaged, read_by_us, 
 START_NS = 1_700_000_000 * NS_PER_S
 
 
-def verified(path, *, decode_pictures=False):
+def verified(path, *, decode_images=False):
     with inspect_recording(path) as recording:
-        return verify_recording(recording, decode_pictures=decode_pictures)
+        return verify_recording(recording, decode_images=decode_images)
 
 
 def counts(found, topic):
@@ -83,7 +83,7 @@ def test_rows_that_are_absent_are_told(tmp_path):
     assert any("(11 to 13)" in warning.message for warning in found.warnings)
 
 
-def pictures(ros, jpeg, others):
+def images(ros, jpeg, others):
     rows = [("/camera/image", START_NS + i * 10**8, ros.compressed(START_NS + i * 10**8, jpeg)) for i in range(8)]
     return rows + [
         ("/camera/image", START_NS + i * 10**8, ros.compressed(START_NS + i * 10**8, other))
@@ -96,9 +96,9 @@ def big_jpeg() -> bytes:
     return bytes(cv2.imencode(".jpg", cv2.GaussianBlur(pixels, (5, 5), 0))[1].tobytes())
 
 
-def test_pictures_that_are_cut_or_none_are_undecodable(ros, write):
+def test_images_that_are_cut_or_none_are_undecodable(ros, write):
     jpeg = big_jpeg()
-    path = write(ros, pictures(ros, jpeg, [jpeg[: len(jpeg) // 2], b"not a picture at all", b""]))
+    path = write(ros, images(ros, jpeg, [jpeg[: len(jpeg) // 2], b"not an image at all", b""]))
     found = verified(path)
     assert counts(found, "/camera/image") == (8, 0, 0, 3)
     assert not found.sound
@@ -106,24 +106,24 @@ def test_pictures_that_are_cut_or_none_are_undecodable(ros, write):
 
 def test_a_png_with_a_wrong_checksum_is_found_without_decoding_it(ros, write):
     png = bytes(cv2.imencode(".png", np.full((24, 32, 3), 90, np.uint8))[1])
-    path = write(ros, pictures(ros, png, [png[:50] + b"?" + png[51:], png[:60] + png[63:]]))
+    path = write(ros, images(ros, png, [png[:50] + b"?" + png[51:], png[:60] + png[63:]]))
     found = verified(path)
     assert counts(found, "/camera/image") == (8, 0, 0, 2)
     assert "damaged after byte 33" in found.topics[0].fault
 
 
-def test_a_picture_that_is_zeroed_in_the_middle_is_found_by_decoding_it(ros, write):
+def test_a_image_that_is_zeroed_in_the_middle_is_found_by_decoding_it(ros, write):
     jpeg = big_jpeg()
     third = len(jpeg) // 3
-    path = write(ros, pictures(ros, jpeg, [jpeg[:third] + bytes(third) + jpeg[2 * third :]]))
+    path = write(ros, images(ros, jpeg, [jpeg[:third] + bytes(third) + jpeg[2 * third :]]))
     assert counts(verified(path), "/camera/image") == (9, 0, 0, 0)
-    found = verified(path, decode_pictures=True)
+    found = verified(path, decode_images=True)
     assert counts(found, "/camera/image") == (8, 0, 0, 1)
     assert "the decoder says" in found.topics[0].fault
 
 
 def test_a_driver_that_writes_no_end_markers_is_not_blamed(ros, write, jpeg):
-    found = verified(write(ros, pictures(ros, jpeg[:-2], [jpeg[:-2]])))
+    found = verified(write(ros, images(ros, jpeg[:-2], [jpeg[:-2]])))
     assert counts(found, "/camera/image") == (9, 0, 0, 0)
     assert found.sound
 
@@ -135,7 +135,7 @@ def test_types_that_are_not_supported_are_unread(ros1, write, jpeg):
     assert found.sound
 
 
-def test_a_folder_names_the_pictures_that_cannot_be_read(tmp_path, jpeg):
+def test_a_folder_names_the_images_that_cannot_be_read(tmp_path, jpeg):
     folder = tmp_path / "front"
     folder.mkdir()
     for number in range(4):

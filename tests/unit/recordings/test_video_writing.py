@@ -17,12 +17,12 @@ def packets(path):
         return [(p.pts * stream.time_base, bytes(p)) for p in container.demux(stream) if p.pts is not None]
 
 
-def camera_rows(ros, pictures, gaps_ms=()):
+def camera_rows(ros, images, gaps_ms=()):
     at, rows = START_NS, []
-    for number, picture in enumerate(pictures):
+    for number, image in enumerate(images):
         at += 33_333_333 + (gaps_ms[number] * 1_000_000 if number < len(gaps_ms) else 0)
-        form = "png" if picture.startswith(b"\x89PNG") else "jpeg"
-        rows.append(("/camera/image/compressed", at, ros.compressed(at, picture, form)))
+        form = "png" if image.startswith(b"\x89PNG") else "jpeg"
+        rows.append(("/camera/image/compressed", at, ros.compressed(at, image, form)))
     return rows
 
 

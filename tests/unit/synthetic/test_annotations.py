@@ -115,7 +115,7 @@ def test_who_is_behind_another_is_partly_hidden_or_has_no_box():
     assert "person-3" not in behind
 
 
-def test_a_box_ends_at_the_border_of_the_picture_and_nobody_outside_has_one():
+def test_a_box_ends_at_the_border_of_the_image_and_nobody_outside_has_one():
     options = simulate(WALK).options
     near = _boxes(("car", 5.5, 3.0, 0.0))["car-1"]
     assert near.left_px == -0.5

@@ -1,4 +1,4 @@
-"""Pictures of boards: the true corners are where an independent detector finds them at a finer scale, for every lens."""
+"""Images of boards: the true corners are where an independent detector finds them at a finer scale, for every lens."""
 
 from dataclasses import replace
 
@@ -25,13 +25,13 @@ def small(model: CameraModel = "plumb_bob") -> Camera:
 
 
 def found_finely(camera: Camera, film: BoardFilm, pose: RigidTransform = POSE) -> tuple[np.ndarray, np.ndarray]:
-    """Return the true corners, and where OpenCV finds them in a picture of the same size with finer pixels."""
+    """Return the true corners, and where OpenCV finds them in an image of the same size with finer pixels."""
     fine = camera.scaled(FINER)
     true = true_corners(BOARD, fine, pose, film)
-    picture = render_board(BOARD, fine, pose, replace(film, blur_px=1.5))
+    image = render_board(BOARD, fine, pose, replace(film, blur_px=1.5))
     window = (9, 9)
     start = true.astype(np.float32).reshape(-1, 1, 2) + np.float32(0.4)
-    found = cv2.cornerSubPix(picture[..., 0].copy(), start, window, (-1, -1), (3, 100, 1e-5))
+    found = cv2.cornerSubPix(image[..., 0].copy(), start, window, (-1, -1), (3, 100, 1e-5))
     back = np.array([1.0, 1.0]) * (0.5 / FINER - 0.5)
     return true / FINER + back, found.reshape(-1, 2) / FINER + back
 
@@ -129,7 +129,7 @@ def test_noise_and_light_are_as_asked_for():
     assert lit[0, 0, 0] == pytest.approx(80 * 0.7 * 0.6, abs=1)
 
 
-def test_the_same_seed_gives_the_same_picture():
+def test_the_same_seed_gives_the_same_image():
     film = BoardFilm(noise_grey=2.0)
     first = render_board(BOARD, small(), POSE, film, seed=3)
     assert np.array_equal(first, render_board(BOARD, small(), POSE, film, seed=3))
@@ -164,7 +164,7 @@ def test_opencv_reads_the_tags_of_a_grid():
     assert first[0] == pytest.approx(first[first.sum(axis=1).argmax()])  # upside down to OpenCV
 
 
-def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_picture():
+def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_image():
     camera, board = typical_camera(), Board("checkerboard", 9, 6, 0.02214)
     poses = waved_poses(np.random.default_rng(1), board, camera, 30)
     pixels = np.concatenate([true_corners(board, camera, pose) for pose in poses])

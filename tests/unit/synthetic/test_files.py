@@ -144,10 +144,10 @@ def test_a_bag_reads_back_whatever_its_compression(tmp_path, compression):
     assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)
 
 
-def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, scans, frames, tmp_path):
+def test_a_folder_without_ros_has_dated_images_and_every_return(recording, scans, frames, tmp_path):
     write_recording(recording, tmp_path, ("csv",))
-    pictures = sorted((tmp_path / "recording_csv" / "camera").iterdir())
-    for path, frame in zip(pictures, frames, strict=True):
+    images = sorted((tmp_path / "recording_csv" / "camera").iterdir())
+    for path, frame in zip(images, frames, strict=True):
         when = datetime.strptime(path.stem, "img_%Y-%m-%d_%H-%M-%S-%f").replace(tzinfo=UTC)
         assert abs(when.timestamp() - frame.time / 1e9) < 2e-6
     rows = list(csv.reader((tmp_path / "recording_csv" / "radar.csv").read_text().splitlines(), delimiter=";"))[1:]
@@ -183,7 +183,7 @@ def test_the_second_camera_sees_the_same_placements_from_its_own_rig():
     assert simulate(OPTIONS).other_camera is None
 
 
-def test_a_folder_of_pictures_has_no_room_for_a_second_camera(tmp_path):
+def test_a_folder_of_images_has_no_room_for_a_second_camera(tmp_path):
     recording = simulate(replace(OPTIONS, other_camera=True))
     with pytest.raises(InputError, match="write a recording of two cameras as ros1, mcap or db3"):
         write_recording(recording, tmp_path / "new", ("csv",))

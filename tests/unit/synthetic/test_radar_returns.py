@@ -124,7 +124,7 @@ def test_a_driver_may_report_y_to_the_right_and_millimetres():
     assert fine == pytest.approx(plain * 1000.0, rel=1e-5)
 
 
-def test_the_published_intrinsics_may_be_wrong_while_the_pictures_and_the_truth_are_not():
+def test_the_published_intrinsics_may_be_wrong_while_the_images_and_the_truth_are_not():
     wrong = IntrinsicsErrors(focal_length_scale=1.02, principal_point_px=(30.0, -10.0))
     recording = simulate(replace(QUIET, placements=1, intrinsics=wrong, width_px=64, height_px=64, camera_rate_hz=1.0))
     [info, *_] = [m.body for m in camera_messages(recording) if isinstance(m.body, CameraInfoMessage)]
@@ -200,7 +200,7 @@ def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
     assert {m.topic for m in messages} == {f"{CLOUD_TOPIC}_near", f"{CLOUD_TOPIC}_far"}
 
 
-def test_a_session_without_pictures_has_the_scans_of_both_antennas():
+def test_a_session_without_images_has_the_scans_of_both_antennas():
     session = simulate(replace(QUIET, placements=2, defects=RadarDefects(near_and_far=True)))
     assert len(session.scans) == sum(len(antenna.times) for antenna in session.stage.antennas)
     assert (np.diff(session.scans.times_ns) > 0).all()

@@ -44,12 +44,12 @@ def _border(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float]:
     return normal, float(normal @ middle - c / length)
 
 
-def _apex_from_picture(picture: np.ndarray) -> np.ndarray:
+def _apex_from_image(image: np.ndarray) -> np.ndarray:
     """Find where the three sheets meet from grey levels alone: sort pixels by brightness, intersect the borders.
 
-    The picture shows only the reflector on its orange block, in front of pure green.
+    The image shows only the reflector on its orange block, in front of pure green.
     """
-    levels = picture.astype(float)
+    levels = image.astype(float)
     grey = (levels.max(axis=2) - levels.min(axis=2)) < 16.0
     inside = (cv2.distanceTransform(grey.astype(np.uint8), cv2.DIST_L2, 5) > 3.0).astype(np.uint8)  # off the bright rim
     _, parts, sizes, _ = cv2.connectedComponentsWithStats(inside)
@@ -78,15 +78,15 @@ def _before_green(rig: Rig) -> FrameRenderer:
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
 @pytest.mark.parametrize("place_m", [(2.0, 0.0), (2.1, 0.8), (2.6, -1.1)])
-def test_the_sheets_in_the_picture_meet_at_the_truth_pixel(model, place_m):
+def test_the_sheets_in_the_image_meet_at_the_truth_pixel(model, place_m):
     rig = random_rig(np.random.default_rng(5), camera=typical_camera(model, width_px=1280, height_px=800))
     apex = np.array([*place_m, 0.19])
     facing_rad = float(np.arctan2(-place_m[1], -place_m[0]))
     person = PersonState(9.0, 0.0, 0.0)
     moment = Moment(person, apex, facing_rad, Resting(0, 0.0, 1.0, apex, facing_rad), 0.19)
-    picture = _before_green(rig).render(moment, person=False)
+    image = _before_green(rig).render(moment, person=False)
     truth = rig.camera.project(rig.camera_from_world @ apex[None])[0]
-    assert np.linalg.norm(_apex_from_picture(picture) - truth) < 0.6
+    assert np.linalg.norm(_apex_from_image(image) - truth) < 0.6
 
 
 def test_the_three_edges_of_a_corner_are_at_right_angles_and_open_towards_the_radar():

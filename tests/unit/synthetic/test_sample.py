@@ -17,7 +17,7 @@ from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.sample import SAMPLE_NAME, SAMPLE_OPTIONS, write_sample
 
 LARGEST_BYTES = 12_000_000
-FIRST_PICTURES = 24
+FIRST_IMAGES = 24
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_the_sample_is_small_enough_to_ship(sample):
 
 @pytest.fixture(scope="module")
 def again(locked: None) -> SimulatedRecording:
-    """Simulate the sample once more; its pictures are rendered when they are asked for."""
+    """Simulate the sample once more; its images are rendered when they are asked for."""
     return simulate(SAMPLE_OPTIONS)
 
 
@@ -90,12 +90,12 @@ def test_the_radar_is_reproduced(sample, again, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_first_pictures_are_reproduced_to_a_few_grey_levels(sample, again):
+def test_the_first_images_are_reproduced_to_a_few_grey_levels(sample, again):
     """The others differ from them in where the person and the reflector are."""
     with open_recording(sample / "camera.bag", require=("image",)) as shipped:
         assert list(again.stage.frame_times.header_ns) == list(shipped.image_times)
-        for index, frame in enumerate(again.frames(FIRST_PICTURES)):
+        for index, frame in enumerate(again.frames(FIRST_IMAGES)):
             encoded = np.frombuffer(frame.jpeg(SAMPLE_OPTIONS.jpeg_quality), dtype=np.uint8)
             apart = np.abs(cv2.imdecode(encoded, cv2.IMREAD_COLOR).astype(int) - shipped.image(index))
-            assert apart.max() <= 8, f"picture {index}"
-            assert apart.mean() <= 0.01, f"picture {index}"
+            assert apart.max() <= 8, f"image {index}"
+            assert apart.mean() <= 0.01, f"image {index}"

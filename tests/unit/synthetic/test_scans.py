@@ -174,7 +174,7 @@ def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher():
     assert heights[1] - heights[0] == pytest.approx(0.32 * 0.16, abs=0.01)
 
 
-def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture():
+def test_placements_at_the_checkerboard_are_at_its_corners_in_the_image():
     options = replace(PRESETS["paper-d2"], placements=2, board_corners=6, dwell_s=4.0, radar_rate_hz=2.0)
     session = simulate(options)
     board = session.stage.scene.board

@@ -89,7 +89,7 @@ def test_an_outlier_has_no_true_candidate():
     assert {place for place, wrong in zip(simulated.true_candidate, simulated.outlier, strict=True) if wrong} == {-1}
 
 
-def test_every_reflector_is_in_the_picture_and_apart_from_the_others():
+def test_every_reflector_is_in_the_image_and_apart_from_the_others():
     simulated = simulate_pairs(40, rng=np.random.default_rng(1), layout=AISLE)
     assert simulated.camera.sees(simulated.camera_from_radar @ simulated.points_radar_m).all()
     gaps = np.linalg.norm(simulated.points_radar_m[:, None] - simulated.points_radar_m[None], axis=2)
@@ -226,7 +226,7 @@ def test_clicks_are_off_by_the_same_pixels_and_by_a_place_next_to_the_phase_cent
 
 @settings(max_examples=20, deadline=None)
 @given(small, st.tuples(pixels, pixels), small)
-def test_the_given_intrinsics_are_wrong_and_the_pictures_are_not(focal_length, principal_point_px, distortion):
+def test_the_given_intrinsics_are_wrong_and_the_images_are_not(focal_length, principal_point_px, distortion):
     errors = SystematicErrors(focal_length=focal_length, principal_point_px=principal_point_px, distortion=distortion)
     simulated = exact_pairs(errors)
     true = simulated.rig.camera

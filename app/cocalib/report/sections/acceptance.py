@@ -44,7 +44,7 @@ def limits_met(required: tuple[str, ...], calibration: Calibration | None) -> tu
         InputError: a text is no limit.
     """
     error = None if calibration is None else stated_error(calibration)
-    stated = {} if error is None else {"deg": error.rotation_deg, "cm": error.position_cm, "px": error.picture_px}
+    stated = {} if error is None else {"deg": error.rotation_deg, "cm": error.position_cm, "px": error.image_px}
     found = []
     for text in required:
         name, _, value = text.partition("=")

@@ -217,7 +217,7 @@ def _figures(calibration: Calibration) -> Markup:
     if np.isfinite(metrics.chi2) and metrics.degrees_of_freedom:
         rows.append(("chi2 / degrees of freedom", f"{plain(metrics.chi2)} / {metrics.degrees_of_freedom}"))
     if np.isfinite(metrics.picture_sigma_px):
-        rows.append(("in the picture (1 sigma, pose)", f"± {plain(metrics.picture_sigma_px, 2)} px"))
+        rows.append(("in the image (1 sigma, pose)", f"± {plain(metrics.picture_sigma_px, 2)} px"))
     either = aed_either_way(CalibrationFile(calibration))
     if differ := either is not None and plain(either[0]) != plain(either[1]):
         rows.insert(1, ("AED without the corrections", f"{plain(either[1])} px"))

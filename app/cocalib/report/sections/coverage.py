@@ -1,4 +1,4 @@
-"""Where the pairs are: in the picture, and seen from above by range and azimuth."""
+"""Where the pairs are: in the image, and seen from above by range and azimuth."""
 
 import numpy as np
 
@@ -6,26 +6,26 @@ from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import captioned, drawing, mark, polyline, rounded_step, text
 from cocalib.report.residual_rows import ResidualRows
-from cocalib.report.sections.uncertainty import picture_layer
+from cocalib.report.sections.uncertainty import image_layer
 from cocalib.view.wording import plain
 
 _WIDTH = 320.0
 _ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "centre", "right")
 
 
-def coverage(calibration: Calibration, rows: ResidualRows, *, with_picture: bool) -> Markup | None:
+def coverage(calibration: Calibration, rows: ResidualRows, *, with_image: bool) -> Markup | None:
     """Return both drawings, each with its sentence; None without pairs."""
     if not len(rows):
         return None
     return tag(
         "section",
         tag("h2", "Coverage"),
-        tag("div", _in_picture(calibration, rows, with_picture=with_picture), _from_above(rows), class_="two"),
+        tag("div", _in_image(calibration, rows, with_image=with_image), _from_above(rows), class_="two"),
         id="coverage",
     )
 
 
-def _in_picture(calibration: Calibration, rows: ResidualRows, *, with_picture: bool) -> Markup:
+def _in_image(calibration: Calibration, rows: ResidualRows, *, with_image: bool) -> Markup:
     camera = calibration.camera
     scale, height = _WIDTH / camera.width_px, _WIDTH * camera.height_px / camera.width_px
     counts = _counts(rows.pixels_px[rows.judged], (camera.width_px, camera.height_px))
@@ -42,27 +42,27 @@ def _in_picture(calibration: Calibration, rows: ResidualRows, *, with_picture: b
         mark(kind, (u + 0.5) * scale, (v + 0.5) * scale)
         for kind, (u, v) in zip(rows.kinds, rows.pixels_px.tolist(), strict=True)
     ]
-    said = _picture_words(counts)
-    layer = picture_layer(calibration, with_picture=with_picture)
-    drawn = drawing(f"Clicks in the picture. {said}", *layer, *lines, *marks, *labels, width=_WIDTH, height=height)
-    return captioned("In the picture", drawn, said)
+    said = _image_words(counts)
+    layer = image_layer(calibration, with_image=with_image)
+    drawn = drawing(f"Clicks in the image. {said}", *layer, *lines, *marks, *labels, width=_WIDTH, height=height)
+    return captioned("In the image", drawn, said)
 
 
 def _counts(pixels_px: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
-    """Count clicks in each ninth of the picture: (3, 3), rows first."""
+    """Count clicks in each ninth of the image: (3, 3), rows first."""
     cells = np.clip(((pixels_px + 0.5) * 3 / np.array(size_px)).astype(int), 0, 2)
     counts = np.zeros((3, 3), dtype=int)
     np.add.at(counts, (cells[:, 1], cells[:, 0]), 1)
     return counts
 
 
-def _picture_words(counts: np.ndarray) -> str:
+def _image_words(counts: np.ndarray) -> str:
     empty = [f"{_ROWS[row]} {_COLUMNS[column]}" for row, column in zip(*np.nonzero(counts == 0), strict=True)]
     total = int(counts.sum())
     clicks = f"{total} {'click' if total == 1 else 'clicks'}"
     if not empty:
-        return f"The {clicks} reach all nine parts of the picture."
-    return f"The {clicks} reach {9 - len(empty)} of nine parts of the picture; none is in: {', '.join(empty)}."
+        return f"The {clicks} reach all nine parts of the image."
+    return f"The {clicks} reach {9 - len(empty)} of nine parts of the image; none is in: {', '.join(empty)}."
 
 
 def _from_above(rows: ResidualRows) -> Markup:

@@ -83,7 +83,7 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
             ("serials", _serials(file.vehicle)),
             ("solved by", f"cocalib {made.version}" if made.version else None),
             ("radar", made.radar_choice or _topic(made.radar_topic, made.radar_clock)),
-            ("pictures", _topic(made.image_topic, made.image_clock)),
+            ("images", _topic(made.image_topic, made.image_clock)),
             ("intrinsics", made.camera_info_topic),
             ("radar axes", made.radar_axes),
             ("video start", made.video_start),

@@ -1,4 +1,4 @@
-"""Residual plots: vectors over the picture, and lengths against range, azimuth, place and time; each with its sentence."""
+"""Residual plots: vectors over the image, and lengths against range, azimuth, place and time; each with its sentence."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cocalib.report.residual_rows import (
     shift_sentence,
     time_sentence,
 )
-from cocalib.report.sections.uncertainty import picture_layer
+from cocalib.report.sections.uncertainty import image_layer
 from cocalib.view.wording import plain
 
 _WIDTH = 320.0
@@ -23,14 +23,14 @@ _MOST_DRAWN = 400
 """More marks than this in one plot are only ink; every k-th is drawn."""
 
 
-def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_picture: bool) -> Markup:
+def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_image: bool) -> Markup:
     """Return the plots.
 
     Args:
         calibration: with the camera.
         rows: the residuals.
         of: whose they are, for the heading.
-        with_picture: whether the page defines a frame.
+        with_image: whether the page defines a frame.
     """
     heading = tag("h2", f"Residuals {of}")
     if not rows.drawn.any():
@@ -43,7 +43,7 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
     if every > 1:
         notes.append(f"One in {every} pairs is drawn.")
     plots: list[Child] = [
-        _vectors(calibration, rows, every, with_picture=with_picture),
+        _vectors(calibration, rows, every, with_image=with_image),
         _against(rows, rows.ranges_m, every, ("Length against range", "range [m]", range_sentence(rows))),
         _against(
             rows,
@@ -56,7 +56,7 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
             rows,
             from_middle,
             every,
-            ("Length across the picture", "distance from the middle [px]", place_sentence(rows, size_px)),
+            ("Length across the image", "distance from the middle [px]", place_sentence(rows, size_px)),
         ),
         _against(
             rows, rows.times_s, every, ("Length against time", "time since the first pair [s]", time_sentence(rows))
@@ -102,7 +102,7 @@ def _key(kind: MarkKind) -> Markup:
     )
 
 
-def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_picture: bool) -> Markup:
+def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_image: bool) -> Markup:
     """Return residuals as lines from the click to the reprojection, magnified by a round factor that the heading states."""
     scale = _WIDTH / calibration.camera.width_px
     height = _WIDTH * calibration.camera.height_px / calibration.camera.width_px
@@ -116,15 +116,15 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_p
         drawn += [tag("line", x1=x, y1=y, x2=x + dx, y2=y + dy, class_="vector"), mark(rows.kinds[index], x, y)]
     shown = tag("svg", *drawn, x=0.0, y=0.0, width=_WIDTH, height=height, class_="clip", aria_hidden="true")
     words = shift_sentence(rows)
-    picture = drawing(
-        f"Residual vectors over the picture, drawn {factor:g} times as long. {words}",
-        *picture_layer(calibration, with_picture=with_picture),
+    image = drawing(
+        f"Residual vectors over the image, drawn {factor:g} times as long. {words}",
+        *image_layer(calibration, with_image=with_image),
         shown,
         width=_WIDTH,
         height=height,
     )
     times = "" if factor == 1.0 else f", {factor:g} times long"
-    return captioned(f"Click to reprojection{times}", picture, words)
+    return captioned(f"Click to reprojection{times}", image, words)
 
 
 def _against(

@@ -1,9 +1,9 @@
-"""The picture: the radar's returns on it, and how far from its drawn place a point may appear at 5, 20 and 60 m."""
+"""The image: the radar's returns on it, and how far from its drawn place a point may appear at 5, 20 and 60 m."""
 
 from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, number, tag
 from cocalib.report.plots import captioned, drawing, polyline, text
-from cocalib.report.subject import Picture, ReportSubject
+from cocalib.report.subject import Image, ReportSubject
 from cocalib.view.contours import ContourMap, contour_maps
 
 _WIDTH = 320.0
@@ -18,40 +18,40 @@ def uncertainty(subject: ReportSubject) -> Markup | None:
     maps = contour_maps(calibration)
     if not any(one.contours for one in maps) and calibration.metrics.n == 0:
         words = tag("p", "This calibration states no uncertainty, so there is no map of it.", class_="note")
-        return tag("section", tag("h2", "Uncertainty in the picture"), words, id="uncertainty")
-    picture = subject.recording.picture if subject.recording is not None else None
-    behind = f" Drawn over {picture.words}." if picture is not None else ""
-    returns = _returns(calibration, picture) if picture is not None and picture.returns_px else None
+        return tag("section", tag("h2", "Uncertainty in the image"), words, id="uncertainty")
+    image = subject.recording.image if subject.recording is not None else None
+    behind = f" Drawn over {image.words}." if image is not None else ""
+    returns = _returns(calibration, image) if image is not None and image.returns_px else None
     grid = "three" if returns is None else "three and-returns"
     return tag(
         "section",
-        tag("h2", "Uncertainty in the picture"),
+        tag("h2", "Uncertainty in the image"),
         tag(
             "p",
             "Lines of equal 95 % uncertainty of a reprojected point, by its distance from the camera; pose only, without the "
             f"noise of a single radar position.{behind}",
             class_="note",
         ),
-        tag("div", returns, *(_map(calibration, one, with_picture=picture is not None) for one in maps), class_=grid),
+        tag("div", returns, *(_map(calibration, one, with_image=image is not None) for one in maps), class_=grid),
         id="uncertainty",
     )
 
 
-def _returns(calibration: Calibration, picture: Picture) -> Markup:
+def _returns(calibration: Calibration, image: Image) -> Markup:
     """Return the frame with the returns of its scan as rings: what a reviewer looks at first."""
     scale, height = _WIDTH / calibration.camera.width_px, _height(calibration)
     rings = [
-        tag("circle", cx=(u + 0.5) * scale, cy=(v + 0.5) * scale, r=2.6, class_="return") for u, v in picture.returns_px
+        tag("circle", cx=(u + 0.5) * scale, cy=(v + 0.5) * scale, r=2.6, class_="return") for u, v in image.returns_px
     ]
     words = f"{len(rings)} returns of the nearest scan where this calibration puts them."
-    layer = picture_layer(calibration, with_picture=True)
+    layer = image_layer(calibration, with_image=True)
     return captioned("returns", drawing(words, *layer, *rings, width=_WIDTH, height=float(number(height))), words)
 
 
-def picture_layer(calibration: Calibration, *, with_picture: bool) -> list[Child]:
-    """Return the outline of the picture, 320 wide, with the frame if there is one; its definition is in the page's head."""
+def image_layer(calibration: Calibration, *, with_image: bool) -> list[Child]:
+    """Return the outline of the image, 320 wide, with the frame if there is one; its definition is in the page's head."""
     height = _height(calibration)
-    frame = tag("use", href="#picture", class_="picture") if with_picture else None
+    frame = tag("use", href="#image", class_="image") if with_image else None
     return [tag("rect", x=0.0, y=0.0, width=_WIDTH, height=height, class_="frame"), frame]
 
 
@@ -59,7 +59,7 @@ def _height(calibration: Calibration) -> float:
     return _WIDTH * calibration.camera.height_px / calibration.camera.width_px
 
 
-def _map(calibration: Calibration, found: ContourMap, *, with_picture: bool) -> Markup:
+def _map(calibration: Calibration, found: ContourMap, *, with_image: bool) -> Markup:
     scale, height = _WIDTH / calibration.camera.width_px, _height(calibration)
     levels = list(dict.fromkeys(one.label for one in found.contours))
     lines: list[Child] = []
@@ -76,7 +76,7 @@ def _map(calibration: Calibration, found: ContourMap, *, with_picture: bool) -> 
             lines.append(text(x, y, contour.label, class_="middle label"))
     drawn = drawing(
         f"Map of the uncertainty at {found.label}. {found.words}",
-        *picture_layer(calibration, with_picture=with_picture),
+        *image_layer(calibration, with_image=with_image),
         *lines,
         width=_WIDTH,
         height=float(number(height)),

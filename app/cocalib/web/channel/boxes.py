@@ -36,7 +36,7 @@ class BoxDesk:
 
         Args:
             workspace: has the calibration.
-            recording: has pictures and radar.
+            recording: has images and radar.
             executor: where to compute.
             tell: sends a message of a kind to all pages.
         """

@@ -246,7 +246,7 @@ class Channel:
     async def _send_overlay(self, cursor: CursorMoved) -> None:
         stamp = TimeNs(int(self._hub.moments[cursor.index]))
         session = self._hub.workspace.session
-        if not self._hub.workspace.facts.has_pictures:
+        if not self._hub.workspace.facts.has_images:
             trail = await self._trail(stamp, cursor.trail_s)
             look = look_of(cursor.index, stamp, trail, session.options.gating)
             self.outbox.put(encode(look), kind="overlay")
@@ -333,10 +333,10 @@ async def snapped(wanted: SnapWanted, moments: TimesNs, frames: FrameStore, exec
         MessageError: the frame cannot be read.
     """
     if not len(frames):
-        raise InputError("this recording has no pictures to snap in; open one with a camera topic")
+        raise InputError("this recording has no images to snap in; open one with a camera topic")
     index = int(np.searchsorted(moments, wanted.image_time))
     if index == len(moments) or int(moments[index]) != wanted.image_time:
-        raise InputError(f"no frame has the stamp {wanted.image_time}; the picture may belong to another recording")
+        raise InputError(f"no frame has the stamp {wanted.image_time}; the image may belong to another recording")
     frame = await frames.get(index)
     answer = await asyncio.get_running_loop().run_in_executor(executor, _search, frame, wanted.pixel_px)
     if isinstance(answer, NoApex):

@@ -53,7 +53,7 @@ class ExportPreview:
         size_bytes: of the file.
         numbers: what the file's numbers mean.
         notes: what a user of the file must know.
-        is_for_rectified: it is for rectified pictures: those that the user declared rectified, or those that its maps make.
+        is_for_rectified: it is for rectified images: those that the user declared rectified, or those that its maps make.
         pose: the pose in the file, as read back: its direction, its frames and its numbers; None if it holds none.
         our_pose: camera_from_radar of the calibration.
         check_point: what a reader of the file must get; None if the calibration has none, or the file no pose.

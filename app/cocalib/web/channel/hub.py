@@ -18,10 +18,10 @@ from cocalib.platform.resources import version
 from cocalib.view import View, warning_row
 from cocalib.web.channel.boxes import BoxDesk
 from cocalib.web.channel.desk import ClosedDesk, Desk
+from cocalib.web.channel.image_changes import ImageChanges, changes_of
 from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.live_edge import LiveEdge
 from cocalib.web.channel.outbox import Outbox, ViewFeed
-from cocalib.web.channel.picture_changes import PictureChanges, changes_of
 from cocalib.web.channel.proposing import ProposingDesk
 from cocalib.web.channel.radar_survey import Survey, survey_of
 from cocalib.web.frames import FrameStore
@@ -80,7 +80,7 @@ class Hub:
         self.radar = RadarSight(recording)
         self.moments = workspace.facts.moments
         self.survey: Survey | None = None
-        self.picture_changes = PictureChanges()
+        self.image_changes = ImageChanges()
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
@@ -194,19 +194,19 @@ class Hub:
         for tab in self.tabs:
             tab.refresh()
         self.proposing.surveyed(self.survey.placements if self.survey else ())
-        if self.workspace.facts.has_pictures:
-            with error_boundary("comparing the pictures", _log.error):
+        if self.workspace.facts.has_images:
+            with error_boundary("comparing the images", _log.error):
                 await changes_of(self.recording, self.moments, self.executor, self._compared, self._is_playing)
 
-    def _compared(self, changes: PictureChanges) -> None:
-        self.picture_changes = changes
+    def _compared(self, changes: ImageChanges) -> None:
+        self.image_changes = changes
 
     def _is_playing(self) -> bool:
         return any(tab.is_playing for tab in self.tabs)
 
     def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
-        """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without pictures."""
-        if survey is not None and not self.workspace.facts.has_pictures:
+        """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without images."""
+        if survey is not None and not self.workspace.facts.has_images:
             yield "radar_map", survey.map
         yield "placements", survey.message if survey else Placements(())
 
@@ -218,7 +218,7 @@ class Hub:
             image_topic=recording.image_topic or "none",
             width_px=facts.width_px,
             height_px=facts.height_px,
-            has_pictures=facts.has_pictures,
+            has_images=facts.has_images,
             frame_times=StampColumns.of(facts.moments),
             start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),

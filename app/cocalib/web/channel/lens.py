@@ -17,16 +17,16 @@ from calib_core.intrinsics import (
     Board,
     CalibratedLens,
     Coverage,
+    ImageGrid,
     LensView,
     ModelTrial,
-    PictureGrid,
     board_of_size,
     projection_uncertainty,
     residual_field,
 )
 from calib_core.recordings import Recording
 from calib_core.words.intrinsics import residuals_text
-from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures, field_of_view_text
+from cocalib.intrinsics import LensJob, LensSnapshot, RecordedImages, field_of_view_text
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
 from cocalib.view import Figure, sentence, warning_row
@@ -61,11 +61,11 @@ class LensDesk:
 
         Args:
             workspace: has the intrinsics in use.
-            recording: has the pictures.
+            recording: has the images.
             tell: sends a message of a kind to all pages.
         """
         self._workspace = workspace
-        self._pictures = RecordedPictures(recording)
+        self._images = RecordedImages(recording)
         self._tell = tell
         self._job = LensJob(self._changed)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -96,7 +96,7 @@ class LensDesk:
         Raises:
             InputError: there is no such board.
         """
-        self._job.start(self._pictures, _board(wanted), wanted.model)
+        self._job.start(self._images, _board(wanted), wanted.model)
 
     def cancel(self, _wanted: LensCancel) -> None:
         """Stop calibrating."""
@@ -172,7 +172,7 @@ class LensDesk:
         return LensState(
             intrinsics=None if camera is None else camera_table(camera, workspace.intrinsics),
             chosen=chosen is not None,
-            pictures=len(self._pictures),
+            images=len(self._images),
             stage=now.stage,
             searched=now.progress.searched if now.progress else 0,
             total=now.progress.total if now.progress else 0,
@@ -283,8 +283,8 @@ def _residuals(views: tuple[LensView, ...]) -> tuple[tuple[float, float, float, 
     return tuple((round(u, 1), round(v, 1), round(du, 3), round(dv, 3)) for u, v, du, dv in found[::every].tolist())
 
 
-def _uncertainty(lens: CalibratedLens) -> PictureGrid | None:
-    """Return how uncertain a projection is over the picture; None if the covariance is not known."""
+def _uncertainty(lens: CalibratedLens) -> ImageGrid | None:
+    """Return how uncertain a projection is over the image; None if the covariance is not known."""
     if lens.camera.covariance is None:
         return None
     columns, rows = _GRID

@@ -185,7 +185,7 @@ def _age_s(stamp_ns: int) -> float | None:
 
 
 def _half_view_rad(camera: Camera | None) -> float:
-    """Return the largest bearing at which a placement is in the picture, and within the radar's good angles [rad]."""
+    """Return the largest bearing at which a placement is in the image, and within the radar's good angles [rad]."""
     if camera is None:
         return float(_WIDEST_HALF_VIEW_RAD)
     edge = camera.rays(np.array([[0.0, (camera.height_px - 1) / 2]]))[0]

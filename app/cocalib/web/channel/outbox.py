@@ -90,7 +90,7 @@ class NewestWins(Generic[Item]):
 
     async def _run(self) -> None:
         while self._next:
-            with error_boundary("a picture or drawing for a page", self._tell):
+            with error_boundary("an image or drawing for a page", self._tell):
                 await self._work(self._next.pop())
 
     def _ended(self, task: "asyncio.Task[None]") -> None:

@@ -31,12 +31,12 @@ from cocalib.workspace import Workspace
 _TELL_EVERY_S = 0.2
 """Pages are told of changes no more often [s]."""
 _SHORTEST_S = 2.0
-"""A target that stands still for less is not looked for in the pictures."""
+"""A target that stands still for less is not looked for in the images."""
 _GROWING = (
-    "the recording is still being written: what changed in the pictures shows once it is complete",
+    "the recording is still being written: what changed in the images shows once it is complete",
     "click the reflector, or wait until the recording is complete",
 )
-_NO_PICTURES = ("there are no pictures to look at", "open the camera's recording, too")
+_NO_IMAGES = ("there are no images to look at", "open the camera's recording, too")
 _NO_RADAR = (
     "there are no radar scans, so nothing says when the reflector stood still",
     "open the radar's recording, too",
@@ -54,7 +54,7 @@ class ProposingDesk:
 
         Args:
             workspace: has the clicks, the options and the intrinsics.
-            recording: has the pictures.
+            recording: has the images.
             tell: sends a message of a kind to all pages.
             on: whether to propose without being asked.
         """
@@ -113,10 +113,10 @@ class ProposingDesk:
         frame = self._workspace.facts.frame_at(wanted.image_time)
         view = view_at(wanted.image_time, pixel_px, self._job.snapshot.views)
         if frame is None or view is None:
-            return Snapped(None, None, "The pictures of this placement were not looked at.", wanted.id)
+            return Snapped(None, None, "The images of this placement were not looked at.", wanted.id)
         found = averaged_over_dwell(view, self._recording, frame, pixel_px)
         if found is None:
-            return Snapped(None, None, "The pictures of this placement show no apex there.", wanted.id)
+            return Snapped(None, None, "The images of this placement show no apex there.", wanted.id)
         column, row = (float(value) for value in found.pixel_px)
         words = f"Averaged over {found.frames} frames, with a standard deviation of {found.sigma_px:.2f} px."
         return Snapped((column, row), found.sigma_px, words, wanted.id)
@@ -136,8 +136,8 @@ class ProposingDesk:
 
     def _obstacle(self) -> tuple[str, str] | None:
         """Say why there can be no proposals, and what to do about it; None if there can."""
-        if not self._workspace.facts.has_pictures:
-            return _NO_PICTURES
+        if not self._workspace.facts.has_images:
+            return _NO_IMAGES
         if not len(self._recording.radar_times):
             return _NO_RADAR
         if isinstance(self._recording, FollowedRecording) and not self._recording.is_complete:

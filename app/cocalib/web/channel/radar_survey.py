@@ -351,7 +351,7 @@ def placement_summary(rows: Sequence[PlacementRow], length_s: float) -> str:
 
 
 def placement_figures(rows: Sequence[PlacementRow], returns_per_scan: float, scans_per_s: float) -> tuple[Figure, ...]:
-    """Return the figures about a recording without pictures.
+    """Return the figures about a recording without images.
 
     Args:
         rows: the placements.

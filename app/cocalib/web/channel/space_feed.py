@@ -25,8 +25,8 @@ from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.sight import Sight, space_look
 
 _PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
-"""Minimum time between two drawings while playing, with and without pictures: the 3D view shares the page's main thread, and the
-picture comes first [s]."""
+"""Minimum time between two drawings while playing, with and without images: the 3D view shares the page's main thread, and the
+image comes first [s]."""
 
 _MOST_RETURNS = 20_000
 _SLOWEST_MPS = 1.0
@@ -48,9 +48,9 @@ class SpaceFeed:
     async def draw(self, cursor: CursorMoved, scene: TabScene) -> SpaceLook | None:
         """Draw a frame; return what the page draws over it, None if nothing was drawn.
 
-        While playing, it is drawn once a second, or thrice without pictures; the frame at which the page stops is always drawn.
+        While playing, it is drawn once a second, or thrice without images; the frame at which the page stops is always drawn.
         """
-        every_s = _PLAYING_EVERY_S if self._hub.workspace.facts.has_pictures else _LOOKING_EVERY_S
+        every_s = _PLAYING_EVERY_S if self._hub.workspace.facts.has_images else _LOOKING_EVERY_S
         if cursor.hidden or (cursor.playing and time.monotonic() < self._drawn_at_s + every_s):
             return None
         self._number += 1
@@ -61,7 +61,7 @@ class SpaceFeed:
 
     async def _sight(self, cursor: CursorMoved) -> Sight:
         hub, stamp = self._hub, TimeNs(int(self._hub.moments[cursor.index]))
-        has_pictures = hub.workspace.facts.has_pictures
+        has_images = hub.workspace.facts.has_images
         session = hub.workspace.session
         calibration = shown_calibration(session, hub.workspace.reference)
         corrected = (calibration.radar_errors if calibration else RadarErrors()).corrected
@@ -76,9 +76,9 @@ class SpaceFeed:
             returns=returns,
             trail_s=cursor.trail_s,
             window=await self._window(cursor, corrected),
-            picture=await self._thumbnail(cursor) if has_pictures else None,
+            image=await self._thumbnail(cursor) if has_images else None,
             camera=hub.camera,
-            has_pictures=has_pictures,
+            has_images=has_images,
             colouring=self._colouring(cursor, survey, returns),
             placements=survey.placements if survey else (),
             map=survey.map if survey and cursor.whole else None,

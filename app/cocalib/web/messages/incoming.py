@@ -41,13 +41,13 @@ class ViewWanted(_Request, frozen=True, tag="view"):
 
 
 class FrameWanted(_Request, frozen=True, tag="frame"):
-    """A page wants the picture of a frame; exactly one binary message answers, unless a newer request comes first.
+    """A page wants the image of a frame; exactly one binary message answers, unless a newer request comes first.
 
     Attributes:
         index: of the frame.
-        request: echoed in the picture's header; a newer request of the same page supersedes this one.
+        request: echoed in the image's header; a newer request of the same page supersedes this one.
         playing: frames follow one another quickly.
-        size: "half" is enough while playing; "rectified" is the whole picture without distortion.
+        size: "half" is enough while playing; "rectified" is the whole image without distortion.
     """
 
     index: FrameIndex
@@ -160,7 +160,7 @@ class CompareWanted(_Request, frozen=True, tag="compare"):
 
 
 class UncertaintyWanted(_Request, frozen=True, tag="uncertainty"):
-    """The contours of the uncertainty in the picture are requested."""
+    """The contours of the uncertainty in the image are requested."""
 
 
 ReviewRequest: TypeAlias = ReviewWanted | PairReviewWanted | CompareWanted | UncertaintyWanted

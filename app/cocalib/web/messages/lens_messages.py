@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from calib_core.intrinsics import BoardKind, Coverage, LeftOutPicture, ModelTrial, PictureGrid
+from calib_core.intrinsics import BoardKind, Coverage, ImageGrid, LeftOutImage, ModelTrial
 from cocalib.view import Figure, WarningRow
 
 LensModelName: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
@@ -43,7 +43,7 @@ class LensCamera:
     Attributes:
         about: where they come from.
         model: name of the lens model.
-        size: of its pictures.
+        size: of its images.
         field: how much it sees, in words.
         parameters: all of them.
         known: whether their standard deviations are.
@@ -64,12 +64,12 @@ class LensState:
     Attributes:
         intrinsics: in use; None if there are none.
         chosen: whether they were chosen in this session, and not given when the recording was opened.
-        pictures: how many there are to look for a board in.
+        images: how many there are to look for a board in.
         stage: what is being done.
-        searched: pictures so far.
-        total: pictures that the search looks at.
-        views: pictures in which the board was found so far.
-        left_out: pictures that are not used so far.
+        searched: images so far.
+        total: images that the search looks at.
+        views: images in which the board was found so far.
+        left_out: images that are not used so far.
         doing: what is computed, in words.
         problem: why there is no result; "" if there is no reason to say.
         hint: what to do about it.
@@ -81,7 +81,7 @@ class LensState:
 
     intrinsics: LensCamera | None
     chosen: bool
-    pictures: int
+    images: int
     stage: Stage
     searched: int
     total: int
@@ -140,12 +140,12 @@ class LensResult:
         rms_px: root mean square distance of all used corners.
         held_out_rms_px: the same for views left out one after the other; not a number if not determined.
         views: that were used, those that fit worst first.
-        left_out: pictures that were not used.
+        left_out: images that were not used.
         trials: models that were tried.
         warnings: what to decide on.
         residuals: found corner (u, v) and its residual (du, dv), of a sample of the corners [px].
         pattern: whether the residuals are more than noise, in a sentence.
-        uncertainty: standard deviation of the projection over the picture [px]; None if it is not known.
+        uncertainty: standard deviation of the projection over the image [px]; None if it is not known.
         unseen: what that cannot see, in sentences.
     """
 
@@ -156,10 +156,10 @@ class LensResult:
     rms_px: float
     held_out_rms_px: float
     views: tuple[LensViewRow, ...]
-    left_out: tuple[LeftOutPicture, ...]
+    left_out: tuple[LeftOutImage, ...]
     trials: tuple[LensTrial, ...]
     warnings: tuple[WarningRow, ...]
     residuals: tuple[tuple[float, float, float, float], ...]
     pattern: str
-    uncertainty: PictureGrid | None
+    uncertainty: ImageGrid | None
     unseen: str

@@ -71,7 +71,7 @@ class ViewChange:
 
 @dataclass(frozen=True, slots=True)
 class ProposalPlace:
-    """A place in the picture where the reflector may stand.
+    """A place in the image where the reflector may stand.
 
     Attributes:
         pixel_px: column and row.
@@ -84,7 +84,7 @@ class ProposalPlace:
 
 @dataclass(frozen=True, slots=True)
 class ProposalRow:
-    """Where the reflector probably stands in the pictures of a placement.
+    """Where the reflector probably stands in the images of a placement.
 
     Attributes:
         placement: its number among the placements, from 0.
@@ -93,7 +93,7 @@ class ProposalRow:
         width_px: of the reflector there.
         confidence: probability that the first place is the reflector, 0 to 1.
         reason: why the confidence is low, as a clause; "" if it is not.
-        places: what the picture shows, the most probable first.
+        places: what the image shows, the most probable first.
     """
 
     placement: int
@@ -137,7 +137,7 @@ class ProposalNews:
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Where points at several distances may appear in the picture.
+    """Where points at several distances may appear in the image.
 
     Attributes:
         revision: of the session that the answer belongs to.
@@ -223,7 +223,7 @@ class RecordingNote:
         image_topic: its camera.
         width_px: columns of a frame.
         height_px: rows of a frame.
-        has_pictures: whether there are frames to click in; without, the moments to look at are those of the radar scans.
+        has_images: whether there are frames to click in; without, the moments to look at are those of the radar scans.
         frame_times: the stamp of every frame, or moment to look at.
         start: the stamp of the first.
         radar: the stamp of every radar scan.
@@ -241,7 +241,7 @@ class RecordingNote:
     image_topic: str
     width_px: int
     height_px: int
-    has_pictures: bool
+    has_images: bool
     frame_times: StampColumns
     start: Stamp
     radar: StampColumns
@@ -362,14 +362,14 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class FrameHeader:
-    """The header that precedes the bytes of a picture.
+    """The header that precedes the bytes of an image.
 
     Attributes:
         index: of the frame; -1 for the preview shown while the recording is being opened.
         request: the number of the message it answers; 0 if it answers none.
         width_px: columns of the recorded frame.
         height_px: rows of the recorded frame.
-        scale: size of this picture relative to the recorded one.
+        scale: size of this image relative to the recorded one.
         format: of the bytes.
         rectified: whether it is shown without distortion.
     """
@@ -469,7 +469,7 @@ def _unicode(tree: object) -> object:
 
 
 def encode_frame(header: FrameHeader, data: bytes) -> bytes:
-    """Encode a picture: length of the header (32 bits, little-endian), the header as JSON, the picture's own bytes."""
+    """Encode an image: length of the header (32 bits, little-endian), the header as JSON, the image's own bytes."""
     text = msgspec.json.encode(header)
     return b"".join((struct.pack("<I", len(text)), text, data))
 

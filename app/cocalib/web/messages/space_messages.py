@@ -14,8 +14,8 @@ class RadarReturn(msgspec.Struct, frozen=True, array_like=True):
     """One radar return; written as an array, since there are many.
 
     Attributes:
-        u_px: column in the picture; None or NaN if it is not in it, or without a calibration.
-        v_px: row in the picture.
+        u_px: column in the image; None or NaN if it is not in it, or without a calibration.
+        v_px: row in the image.
         range_m: as the radar reports it.
         doppler_mps: positive moving away; None or NaN if the radar has none.
         snr_db: None or NaN if the radar has none.
@@ -63,7 +63,7 @@ class SpaceReflector:
     Attributes:
         id: of the click.
         position_m: (x, y, z).
-        pixel_px: (u, v) in the picture; None if it is not in it.
+        pixel_px: (u, v) in the image; None if it is not in it.
     """
 
     id: str
@@ -77,7 +77,7 @@ class SpacePlacement:
 
     Attributes:
         position_m: (x, y, z) where it is drawn.
-        pixel_px: (u, v) in the picture; None if it is not in it, or without a calibration.
+        pixel_px: (u, v) in the image; None if it is not in it, or without a calibration.
         state: whether it has a click, or was dismissed.
     """
 
@@ -136,7 +136,7 @@ class SpaceLook:
         ground_m: height of the rings.
         range_m: how far the data reach.
         legend: of the colours.
-        projected: whether there is a calibration that says where things are in the picture.
+        projected: whether there is a calibration that says where things are in the image.
     """
 
     number: int
@@ -199,7 +199,7 @@ class Placements:
 
 @dataclass(frozen=True, slots=True)
 class RadarLook:
-    """The returns of the last seconds, for a recording without pictures.
+    """The returns of the last seconds, for a recording without images.
 
     Attributes:
         index: of the scan that is shown.

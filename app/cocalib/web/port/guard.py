@@ -1,6 +1,6 @@
 """Access control for the port: Host allow-list, Origin check, one-time link, then a cookie.
 
-The port serves the pictures and clicks of a recording, which may be confidential. Web pages from other sites, rebound DNS
+The port serves the images and clicks of a recording, which may be confidential. Web pages from other sites, rebound DNS
 names and other users of the machine must not get access.
 """
 

@@ -25,11 +25,11 @@ from cocalib.session import Session
 from cocalib.solving.solving import calibration_text
 from cocalib.view import sentence
 from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
+from cocalib.web.channel.image_changes import ImageChanges
 from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
-from cocalib.web.channel.picture_changes import PictureChanges
 from cocalib.web.channel.radar_survey import Survey
-from cocalib.web.exports import FieldError, format_rows, picture_of
+from cocalib.web.exports import FieldError, format_rows, image_of
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
 
@@ -43,7 +43,7 @@ _TYPES = {
     ".png": "image/png",
     **dict.fromkeys(("", ".cff", ".toml", ".txt"), "text/plain; charset=utf-8"),
 }
-_PICTURE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
+_IMAGE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
 _ALWAYS = (
     ("X-Content-Type-Options", "nosniff"),
     ("X-Frame-Options", "SAMEORIGIN"),
@@ -73,7 +73,7 @@ _SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_/]+\.js)">')
 
 
 class Surveyor(Protocol):
-    """Provides the radar survey once it is complete, how much the pictures change, and the lens, as far as they are known."""
+    """Provides the radar survey once it is complete, how much the images change, and the lens, as far as they are known."""
 
     @property
     def survey(self) -> Survey | None:
@@ -81,8 +81,8 @@ class Surveyor(Protocol):
         ...
 
     @property
-    def picture_changes(self) -> PictureChanges:
-        """How much the pictures change."""
+    def image_changes(self) -> ImageChanges:
+        """How much the images change."""
         ...
 
     @property
@@ -200,8 +200,8 @@ class _Downloads:
             "/api/activity.json": self._activity,
             "/api/camera.yaml": self._camera,
             "/api/board_corners.json": self._board_corners,
-            "/api/picture_changes.json": self._picture_changes,
-            "/api/check_point_picture": self._check_point_picture,
+            "/api/image_changes.json": self._image_changes,
+            "/api/check_point_image": self._check_point_image,
             "/api/meanings.json": self._meanings,
             "/api/meaning.jpg": self._meaning,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
@@ -236,16 +236,16 @@ class _Downloads:
             return reply
         return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
 
-    def _check_point_picture(self, _query: str) -> Reply:
+    def _check_point_image(self, _query: str) -> Reply:
         """Return the frame in which the check point was clicked; the query only tells one calibration's from another's."""
 
         def make(text: str) -> Reply:
-            stamp, times = picture_of(_file_of(text)), self._recording.image_times
+            stamp, times = image_of(_file_of(text)), self._recording.image_times
             index = -1 if stamp is None else int(np.searchsorted(times, stamp))
             if not 0 <= index < len(times) or times[index] != stamp:
-                return refusal(404, "No picture shows the check point.")
-            picture = self._recording.image_bytes(index)
-            return _reply(picture.data, _PICTURE_TYPES[picture.format], more=(("Cache-Control", "no-store"),))
+                return refusal(404, "No image shows the check point.")
+            image = self._recording.image_bytes(index)
+            return _reply(image.data, _IMAGE_TYPES[image.format], more=(("Cache-Control", "no-store"),))
 
         return self._of_calibration(make)
 
@@ -287,13 +287,13 @@ class _Downloads:
 
     def _meaning(self, query: str) -> Reply:
         try:
-            picture = drawn_meaning(self._workspace.open_meaning, self._recording, query)
+            image = drawn_meaning(self._workspace.open_meaning, self._recording, query)
         except CalibrationError as error:
             return refusal(409, sentence(str(error)))
-        return _reply(picture, _TYPES[".jpg"])
+        return _reply(image, _TYPES[".jpg"])
 
-    def _picture_changes(self, _query: str) -> Reply:
-        return _reply(msgspec.json.encode(self._hub.picture_changes), _TYPES[".json"])
+    def _image_changes(self, _query: str) -> Reply:
+        return _reply(msgspec.json.encode(self._hub.image_changes), _TYPES[".json"])
 
 
 def _served(folder: Path) -> dict[str, Path]:

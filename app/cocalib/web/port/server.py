@@ -122,13 +122,13 @@ class RunningServer:
         """Run on the event loop, and wait until it is done."""
         asyncio.run_coroutine_threadsafe(work, self._viser.get_event_loop()).result()
 
-    def show(self, picture: EncodedImage) -> None:
-        """Show a picture of the recording on the pages that are waiting for it.
+    def show(self, image: EncodedImage) -> None:
+        """Show an image of the recording on the pages that are waiting for it.
 
         Raises:
             RuntimeError: the server has stopped.
         """
-        self._viser.get_event_loop().call_soon_threadsafe(self._room.show, picture)
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.show, image)
 
     def tell(self, opening: Opening) -> None:
         """Tell the pages that are waiting what is being done."""

@@ -42,7 +42,7 @@ class Service:
         self,
         link: Link | ServerOptions,
         opening: Opening,
-        first_picture: Callable[[], EncodedImage | None],
+        first_image: Callable[[], EncodedImage | None],
         *,
         let_in_after_s: float,
         desk: ChoosingDesk | None = None,
@@ -52,14 +52,14 @@ class Service:
         Args:
             link: where the page is served, and who has access; one that was announced already can be in use.
             opening: the message for waiting pages.
-            first_picture: reads the picture for waiting pages, in its own thread; returns None if there is none to show early.
+            first_image: reads the image for waiting pages, in its own thread; returns None if there is none to show early.
             let_in_after_s: delay before waiting pages are admitted [s]; with 0, the link is printed before anything is opened,
                 so that opening the recording and starting the browser do not slow each other down.
             desk: answers what pages ask about the choice of a recording; without, the recording is kept.
         """
         self._link = Link(link) if isinstance(link, ServerOptions) else link
         self._opening = opening
-        self._first_picture = first_picture
+        self._first_image = first_image
         self._let_in_after_s = let_in_after_s
         self._desk = desk
         self._chosen = threading.Event() if desk is None else desk.chosen
@@ -152,10 +152,10 @@ class Service:
     def _start_if_slow(self) -> RunningServer | None:
         if self._is_settled.wait(self._let_in_after_s):
             return None
-        picture = self._threads.submit(self._first_picture)
+        image = self._threads.submit(self._first_image)
         print(self._opening.doing, flush=True)
         server = self._start(WaitingRoom(self._opening, self._desk))
-        picture.add_done_callback(lambda done: _show(server, done))
+        image.add_done_callback(lambda done: _show(server, done))
         return server
 
     def _start(self, room: WaitingRoom) -> RunningServer:
@@ -165,11 +165,11 @@ class Service:
         return server
 
 
-def _show(server: RunningServer, picture: "Future[EncodedImage | None]") -> None:
-    """Show the first picture, if there is one; opening the recording reports any error in it."""
-    if picture.exception() is not None:
-        _log.warning("the first picture could not be read: %s", picture.exception())
-    elif (found := picture.result()) is not None:
+def _show(server: RunningServer, image: "Future[EncodedImage | None]") -> None:
+    """Show the first image, if there is one; opening the recording reports any error in it."""
+    if image.exception() is not None:
+        _log.warning("the first image could not be read: %s", image.exception())
+    elif (found := image.result()) is not None:
         with contextlib.suppress(RuntimeError):  # the server has stopped in the meantime
             server.show(found)
 

@@ -1,4 +1,4 @@
-"""Pages that wait while the recording is being opened, or chosen: they show its first picture, what can be chosen, and why.
+"""Pages that wait while the recording is being opened, or chosen: they show its first image, what can be chosen, and why.
 
 Messages about the choice are answered at once; all others are kept until the recording is open.
 """
@@ -35,7 +35,7 @@ _REFUSAL_TIMEOUT_S = 3.0
 
 
 class WaitingRoom:
-    """Sends to every waiting page, once and in order: what is being done, the first picture, the end. Runs on the event loop."""
+    """Sends to every waiting page, once and in order: what is being done, the first image, the end. Runs on the event loop."""
 
     def __init__(self, opening: Opening | None = None, desk: Desk | None = None) -> None:
         self._desk: Desk = desk or ClosedDesk()
@@ -50,10 +50,10 @@ class WaitingRoom:
         """Say what is being done now."""
         self._add(encode(opening))
 
-    def show(self, picture: EncodedImage) -> None:
-        """Show a picture. It is not a frame yet: it has no index and no time."""
-        header = FrameHeader(-1, 0, picture.width_px, picture.height_px, 1.0, picture.format)
-        self._add(encode_frame(header, picture.data))
+    def show(self, image: EncodedImage) -> None:
+        """Show an image. It is not a frame yet: it has no index and no time."""
+        header = FrameHeader(-1, 0, image.width_px, image.height_px, 1.0, image.format)
+        self._add(encode_frame(header, image.data))
 
     def start_over(self, opening: Opening) -> None:
         """Say that another recording is being opened; pages that come from now on see nothing of the one before."""

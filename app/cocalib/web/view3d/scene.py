@@ -1,4 +1,4 @@
-"""The 3D view of one tab, in viser: radar axes, chosen returns, placements, the camera with its picture."""
+"""The 3D view of one tab, in viser: radar axes, chosen returns, placements, the camera with its image."""
 
 import threading
 from typing import TYPE_CHECKING, Any
@@ -58,7 +58,7 @@ class TabScene:
     def __init__(self, client: "viser.ClientHandle") -> None:
         self._client = client
         self._lock = threading.Lock()
-        self._pictured: int | None = None
+        self._imaged: int | None = None
         self._posed: object = self
         self._paired: object = None
         self._extent: Extent | None = None
@@ -101,12 +101,12 @@ class TabScene:
             self._show_extent(sight)
             self._show_returns(sight)
             self._survey.show(sight)
-            self._frustum.visible = sight.has_pictures
-            if sight.has_pictures:
+            self._frustum.visible = sight.has_images
+            if sight.has_images:
                 self._show_pose(sight)
                 self._show_pairs(sight)
                 self._show_advice(sight)
-                self._show_picture(sight)
+                self._show_image(sight)
             self._shown.position = (float(sight.index), float(sight.number), 0.0)  # the page reads which frame this is
         self._client.flush()
 
@@ -216,13 +216,13 @@ class TabScene:
         place = advice.best.position_radar_m
         fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.colouring.extent.range_m)))
 
-    def _show_picture(self, sight: Sight) -> None:
-        picture = sight.picture
-        if picture is None or picture.header.index == self._pictured:
+    def _show_image(self, sight: Sight) -> None:
+        image = sight.image
+        if image is None or image.header.index == self._imaged:
             return
-        self._pictured = picture.header.index
+        self._imaged = image.header.index
         self._frustum._format = "jpeg"
-        self._frustum._image_data = picture.data  # compressed bytes as they are; the public property encodes again
+        self._frustum._image_data = image.data  # compressed bytes as they are; the public property encodes again
 
 
 def _ground(scene: "viser.SceneApi") -> tuple[Any, Any]:

@@ -133,7 +133,7 @@ def nominal_camera_from_radar() -> RigidTransform:
 
 
 def vertical_field_of_view_rad(camera: Camera) -> float:
-    """Return the angle that the picture's height spans, ignoring lens distortion."""
+    """Return the angle that the image's height spans, ignoring lens distortion."""
     return 2.0 * float(np.arctan2(camera.height_px / 2.0, camera.matrix_px[1, 1]))
 
 

@@ -43,9 +43,9 @@ class Sight:
         returns: of the nearest scan, or of the last seconds.
         trail_s: how long returns stay; 0 for one scan.
         window: static returns around the selected click.
-        picture: a thumbnail of the frame; None when it cannot be read, or without pictures.
-        camera: the recording's intrinsics, used until there is a calibration; None without pictures.
-        has_pictures: whether there is a camera to show.
+        image: a thumbnail of the frame; None when it cannot be read, or without images.
+        camera: the recording's intrinsics, used until there is a calibration; None without images.
+        has_images: whether there is a camera to show.
         colouring: what the colours of returns mean, with the extent of the data.
         placements: found in the whole recording.
         map: of the static returns of the whole recording; None until it is known, or if it is not to be drawn.
@@ -60,9 +60,9 @@ class Sight:
     returns: Returns
     trail_s: float
     window: Returns
-    picture: Frame | None
+    image: Frame | None
     camera: Camera | None
-    has_pictures: bool
+    has_images: bool
     colouring: Colouring
     placements: Sequence[Placement] = ()
     map: RadarMap | None = None

@@ -74,7 +74,7 @@ def test_a_manifest_elsewhere_names_whole_paths(tmp_path):
     assert row.recording == (tmp_path / "data" / "van.bag",)
 
 
-def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path):
+def test_folders_of_images_and_tables_are_named_as_left_out(tmp_path):
     frames = ("frames/1.png", "frames/2.png", "radar.csv")
     lay(tmp_path, "van 1/drive.mcap", "van 1/thumbs/1.png", *(f"van 2/{name}" for name in frames))
     text, count = first_manifest(tmp_path, tmp_path / "sessions.toml")

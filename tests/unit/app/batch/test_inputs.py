@@ -36,8 +36,8 @@ print("\\n".join(sorted(opened)))
 _P2 = "P2: " + " ".join(["700", "0", "32", "0", "0", "700", "24", "0", "0", "0", "1", "0"]) + "\n"
 
 
-def pictures(folder: Path, names: tuple[str, ...]) -> Path:
-    """Write small pictures."""
+def images(folder: Path, names: tuple[str, ...]) -> Path:
+    """Write small images."""
     import cv2
     import numpy as np
 
@@ -48,7 +48,7 @@ def pictures(folder: Path, names: tuple[str, ...]) -> Path:
 
 
 def kitti_frames(root: Path) -> Path:
-    folder = pictures(root / "set" / "image_2", ("000000.png", "000001.png"))
+    folder = images(root / "set" / "image_2", ("000000.png", "000001.png"))
     (root / "set" / "calib").mkdir()
     for name in ("000000.txt", "000001.txt"):
         (root / "set" / "calib" / name).write_text(_P2)
@@ -57,14 +57,14 @@ def kitti_frames(root: Path) -> Path:
 
 
 def kitti_raw(root: Path) -> Path:
-    folder = pictures(root / "day" / "drive" / "image_02" / "data", ("0.png", "1.png"))
+    folder = images(root / "day" / "drive" / "image_02" / "data", ("0.png", "1.png"))
     (folder.parent / "timestamps.txt").write_text("2026-01-01 10:00:00.000000000\n2026-01-01 10:00:00.100000000\n")
     (root / "day" / "calib_cam_to_cam.txt").write_text(_P2.replace("P2", "P_rect_02") + "S_rect_02: 64 48\n")
     return folder
 
 
 def table_beside(root: Path) -> Path:
-    folder = pictures(root / "camera", ("a.png", "b.png"))
+    folder = images(root / "camera", ("a.png", "b.png"))
     (root / "camera.csv").write_text("file,time_ns\na.png,1760000000000000000\nb.png,1760000000100000000\n")
     return folder
 

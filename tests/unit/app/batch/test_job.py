@@ -27,7 +27,7 @@ def put(path: Path, content: str = "content", age_s: float = 60.0) -> Path:
 
 @pytest.fixture
 def row(tmp_path: Path) -> ManifestRow:
-    recording = put(tmp_path / "in" / "drive.bag"), put(tmp_path / "in" / "pictures" / "1.jpg").parent
+    recording = put(tmp_path / "in" / "drive.bag"), put(tmp_path / "in" / "images" / "1.jpg").parent
     return ManifestRow("van", "1", recording, place="line 3")
 
 
@@ -84,11 +84,11 @@ def test_another_version_of_the_program_makes_another_digest(row, tmp_path, monk
 
 
 READ = (
-    *("drive.bag", "pictures/1.jpg", "pictures/2.jpg", "pictures/below/3.jpg", "metadata.yaml", "drive.csv"),
-    *("pictures.csv", "pictures.txt", "timestamps.txt", "calib.txt", "calib/000001.txt", "calib_cam_to_cam.txt"),
+    *("drive.bag", "images/1.jpg", "images/2.jpg", "images/below/3.jpg", "metadata.yaml", "drive.csv"),
+    *("images.csv", "images.txt", "timestamps.txt", "calib.txt", "calib/000001.txt", "calib_cam_to_cam.txt"),
     "v1.0-mini/calibrated_sensor.json",
 )
-NOT_READ = ("clicks.json", "other.bag", "pictures/.hidden", "drive.bag.cocalib-session/journal")
+NOT_READ = ("clicks.json", "other.bag", "images/.hidden", "drive.bag.cocalib-session/journal")
 
 
 @pytest.mark.parametrize("name", [*READ, *NOT_READ])

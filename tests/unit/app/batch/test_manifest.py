@@ -125,6 +125,6 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
             read_manifest(tmp_path / "binary.toml")
 
 
-def test_the_size_of_the_reflector_and_resized_pictures(tmp_path):
+def test_the_size_of_the_reflector_and_resized_images(tmp_path):
     (row,) = rows_of(f"[defaults]\nreflector_m = 0.3\n{ROW}rescale_camera = true\n", tmp_path)
     assert (row.reflector_m, row.rescale_camera) == (0.3, True)

@@ -24,23 +24,23 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
     import cv2
 
     ros = Ros(2)
-    picture = bytes(cv2.imencode(".jpg", np.full((48, 64, 3), 90, dtype=np.uint8))[1])
-    path = write_rows(tmp_path_factory.mktemp("drive") / "drive", ros, recorded(ros, picture, "new"), "mcap")
+    image = bytes(cv2.imencode(".jpg", np.full((48, 64, 3), 90, dtype=np.uint8))[1])
+    path = write_rows(tmp_path_factory.mktemp("drive") / "drive", ros, recorded(ros, image, "new"), "mcap")
     with inspect_recording(path) as opened:
         yield opened
 
 
-def test_a_file_is_read_for_the_frames_of_the_recording_and_refused_for_pictures_of_another_size(recording, tmp_path):
+def test_a_file_is_read_for_the_frames_of_the_recording_and_refused_for_images_of_another_size(recording, tmp_path):
     path = tmp_path / "boxes.json"
     path.write_text(boxes_text(Boxes((FRAME,), "anything", (64, 48))), encoding="utf-8")
     assert find_boxes(str(path), recording) == Boxes((FRAME,), "boxes.json", (64, 48))
     assert len(find_boxes("/boxes", recording)) == 3, "of a topic"
     path.write_text(boxes_text(Boxes((FRAME,), "anything", (1920, 1080))), encoding="utf-8")
-    with pytest.raises(InputError, match="made on pictures of 1920 x 1080 px, the recorded ones have 64 x 48"):
+    with pytest.raises(InputError, match="made on images of 1920 x 1080 px, the recorded ones have 64 x 48"):
         find_boxes(str(path), recording)
 
 
-def test_the_word_moving_looks_at_the_pictures(recording):
+def test_the_word_moving_looks_at_the_images(recording):
     seen: list[tuple[int, int]] = []
     with pytest.raises(InputError, match="nothing moves in 8 frames"):
         find_boxes("moving", recording, progress=lambda done, total: seen.append((done, total)))

@@ -23,8 +23,8 @@ BOARD = Board("checkerboard", 9, 6, 0.025)
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 
 
-class Pictures:
-    """Pictures that nobody looks at."""
+class Images:
+    """Images that nobody looks at."""
 
     def __init__(self, count: int = 8) -> None:
         self.count = count
@@ -38,7 +38,7 @@ def view(index: int) -> BoardCorners:
 
 
 class Search:
-    """What replaces the search: it goes on picture by picture, as the test allows."""
+    """What replaces the search: it goes on image by image, as the test allows."""
 
     def __init__(self) -> None:
         self.allowed = threading.Semaphore(0)
@@ -49,7 +49,7 @@ class Search:
 
     def __call__(
         self,
-        pictures: Pictures,
+        images: Images,
         board: Board,
         model: object,
         *,
@@ -61,16 +61,16 @@ class Search:
         self.known.append(known)
         self.searched.append(searched)
         views = list(known)
-        for index in range(len(pictures)):
+        for index in range(len(images)):
             assert self.allowed.acquire(timeout=20)
             if self.error is not None:
                 raise self.error
             if stopped():
                 return Unsolvable.reported("stopped", "the search was stopped", "start it again")
             views = [*views, view(index)] if index not in [one.index for one in views] else views
-            progress(SearchProgress(index + 1, len(pictures), tuple(views), indices=tuple(range(index + 1))))
+            progress(SearchProgress(index + 1, len(images), tuple(views), indices=tuple(range(index + 1))))
         progress("choosing a lens model")
-        search = BoardSearch(board, (640, 480), tuple(views), (), len(pictures))
+        search = BoardSearch(board, (640, 480), tuple(views), (), len(images))
         lens = CalibratedLens(CAMERA, board, board.corners_m, (), (), 0.1, 0.11)
         return self.end or (search, lens)
 
@@ -118,7 +118,7 @@ def watched(search: Search) -> Iterator[Watched]:
 
 def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search, watched):
     assert watched.job.snapshot.stage == "idle"
-    watched.job.start(Pictures(), BOARD, "auto")
+    watched.job.start(Images(), BOARD, "auto")
     assert watched.job.snapshot.is_running
     search.allowed.release(3)
     assert len(watched.until("searching", 3).progress.views) == 3
@@ -130,9 +130,9 @@ def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search, watched):
 
 
 def test_only_one_calibration_runs_at_a_time(search, watched):
-    watched.job.start(Pictures(), BOARD, "auto")
+    watched.job.start(Images(), BOARD, "auto")
     with pytest.raises(InputError, match="cancel it first"):
-        watched.job.start(Pictures(), BOARD, "auto")
+        watched.job.start(Images(), BOARD, "auto")
     search.allowed.release(8)
     watched.until("done")
     assert len(search.known) == 1
@@ -140,7 +140,7 @@ def test_only_one_calibration_runs_at_a_time(search, watched):
 
 @pytest.mark.parametrize(("board", "is_same"), [(BOARD, True), (Board("checkerboard", 8, 6, 0.025), False)])
 def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(search, watched, board, is_same):
-    watched.job.start(Pictures(), BOARD, "auto")
+    watched.job.start(Images(), BOARD, "auto")
     search.allowed.release(4)
     watched.until("searching", 4)
     watched.job.cancel()
@@ -148,7 +148,7 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
     cancelled = watched.until("cancelled")
     assert cancelled.can_resume
     assert cancelled.problem == "", "a person wanted it"
-    watched.job.start(Pictures(), board, "auto")
+    watched.job.start(Images(), board, "auto")
     search.allowed.release(8)
     watched.until("done")
     assert [one.index for one in search.known[1]] == ([0, 1, 2, 3] if is_same else [])
@@ -158,7 +158,7 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
 def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, tmp_path):
 
     def ended(stage: LensStage) -> LensSnapshot:
-        watched.job.start(Pictures(), BOARD, "auto")
+        watched.job.start(Images(), BOARD, "auto")
         search.allowed.release(8)
         return watched.until(stage)
 
@@ -173,9 +173,9 @@ def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watc
     assert "KeyError" in ended("failed").problem, "it ends the calibration and not the program"
 
 
-def test_without_pictures_or_after_closing_nothing_is_started(search, watched):
-    with pytest.raises(InputError, match="no pictures"):
-        watched.job.start(Pictures(0), BOARD, "auto")
+def test_without_images_or_after_closing_nothing_is_started(search, watched):
+    with pytest.raises(InputError, match="no images"):
+        watched.job.start(Images(0), BOARD, "auto")
     watched.job.close()
     with pytest.raises(InputError, match="being closed"):
-        watched.job.start(Pictures(), BOARD, "auto")
+        watched.job.start(Images(), BOARD, "auto")

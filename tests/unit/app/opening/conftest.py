@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
-from tests.picture_recording import grey_frames
+from tests.image_recording import grey_frames
 
 
 @pytest.fixture(scope="session")
 def without_intrinsics(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with pictures, a radar table and, apart from them, camera.yaml."""
+    """Return a folder with images, a radar table and, apart from them, camera.yaml."""
     folder = tmp_path_factory.mktemp("recordings")
     options = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0)
     with grey_frames():

@@ -10,13 +10,13 @@ from cocalib.opening.opened import fitting_clicks, session_folder, session_offer
 from cocalib.session import ClickPlaced, RecordingFacts
 from cocalib.session.file import SessionFileError, has_session_of, open_session_file
 from cocalib.workspace import open_workspace, recording_facts
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """Return a recording with a session of three frames and two clicks."""
-    recording = PictureRecording(grey_pictures(3))
+    recording = ImageRecording(grey_images(3))
     folder = tmp_path / "a.bag.cocalib-session"
     workspace = open_workspace(recording, camera=None, session_folder=folder, name="a.bag")
     for frame in (0, 2):
@@ -27,7 +27,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def facts(count: int, start: int = 0) -> RecordingFacts:
-    recording = PictureRecording(grey_pictures(count + start))
+    recording = ImageRecording(grey_images(count + start))
     whole = recording_facts(recording, "a.bag")
     return RecordingFacts(whole.name, whole.image_times[start:], whole.width_px, whole.height_px)
 

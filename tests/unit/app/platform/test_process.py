@@ -53,9 +53,9 @@ print(faults())
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
-def test_pictures_reuse_the_memory_of_earlier_ones():
+def test_images_reuse_the_memory_of_earlier_ones():
     answer = subprocess.run([sys.executable, "-c", _FAULTS], check=True, capture_output=True, text=True)
-    assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages
+    assert int(answer.stdout) < 1000  # 20 images of two sizes are over 60 000 pages
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a thread has a priority of its own on Linux only")

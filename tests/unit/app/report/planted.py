@@ -13,7 +13,7 @@ from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.making import subject_of
 from cocalib.report.residual_rows import ResidualRows
-from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
+from cocalib.report.subject import Against, Image, Judged, ReportSubject, Watched
 
 SIZE_PX = (640, 480)
 _N = 60
@@ -79,8 +79,8 @@ def subject_for(project_root: Path, calibration: Calibration | None = None) -> R
 
 def watched_recording(**changes: object) -> Watched:
     """Return a recording with a frame to draw over."""
-    picture = Picture(b"\xff\xd8 a picture", "the frame at 1.000000000 s")
-    return replace(Watched("radar.bag", (FILE,), (("radar", "/radar"),), (), picture), **changes)
+    image = Image(b"\xff\xd8 an image", "the frame at 1.000000000 s")
+    return replace(Watched("radar.bag", (FILE,), (("radar", "/radar"),), (), image), **changes)
 
 
 def box_figures() -> BoxFigures:
@@ -105,7 +105,7 @@ def box_figures() -> BoxFigures:
 
 
 def fullest_subject(project_root: Path) -> ReportSubject:
-    """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright picture, another calibration."""
+    """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright image, another calibration."""
     calibration, rng = golden(project_root), np.random.default_rng(2)
     width_px, height_px = _UPRIGHT_PX
     camera = Camera("pinhole", width_px, height_px, np.array([[500.0, 0, 240], [0, 500, 400], [0, 0, 1]]))
@@ -123,8 +123,8 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     subject = subject_for(project_root, full)
     files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
     jpeg = cv2.imencode(".jpg", np.full((height_px, width_px, 3), 200, np.uint8))[1].tobytes()
-    picture = Picture(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
-    seen = watched_recording(inputs=files, warnings=warnings, picture=picture)
+    image = Image(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
+    seen = watched_recording(inputs=files, warnings=warnings, image=image)
     moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
     compared = compare(subject_for(project_root, moved).found, subject.found)
     against = Against("other.json", (FILE,), compared, (long,) * 4)

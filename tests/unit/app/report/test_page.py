@@ -98,7 +98,7 @@ def test_text_of_a_recording_or_a_file_stays_text(project_root):
 
 
 def test_what_is_said_of_the_vehicle_hides_nothing_else(subject):
-    plain = replace(subject, recording=watched_recording(topics=(("radar", "/r"), ("pictures", "/i"))))
+    plain = replace(subject, recording=watched_recording(topics=(("radar", "/r"), ("images", "/i"))))
     topics = {"radar_topic": "/r", "image_topic": "/i", "camera_info_topic": "/c", "radar_axes": "forward,left,up"}
     assumptions = (AssumptionNote("metres", True), AssumptionNote("m/s", True))
     made = Provenance(version="1", **topics, video_start="0", column_map=("x=a:m",), assumptions=assumptions)
@@ -113,7 +113,7 @@ def test_what_is_said_of_the_vehicle_hides_nothing_else(subject):
         return [f"{name}: {text}" for name, text in zip(rows, rows, strict=True)]
 
     stated = ["vehicle: V017, of type van", "session: 2026-09-21", "serials: radar R-1, camera <img src=x>"]
-    assert facts(VehicleNote())[-1] == "recording, pictures: /i"
+    assert facts(VehicleNote())[-1] == "recording, images: /i"
     assert [one for one in facts(note) if one not in stated] == facts(VehicleNote())
     assert [one for one in facts(note) if one in stated] == stated
 
@@ -217,8 +217,8 @@ def test_what_is_no_limit_is_refused(text):
 
 def test_the_returns_are_drawn_where_the_calibration_puts_them(subject, project_root):
     camera, seen = golden(project_root).camera, watched_recording()
-    picture = replace(seen.picture, returns_px=((-0.5, -0.5), (camera.width_px - 0.5, 9.5)))
-    page = _parsed(replace(subject, recording=replace(seen, picture=picture)))
+    image = replace(seen.image, returns_px=((-0.5, -0.5), (camera.width_px - 0.5, 9.5)))
+    page = _parsed(replace(subject, recording=replace(seen, image=image)))
     rings = [one for one in page.iter(f"{_SVG}circle") if one.get("class") == "return"]
     assert [one.get("cx") for one in rings] == ["0", "320"]
     assert rings[0].get("cy") == "0"

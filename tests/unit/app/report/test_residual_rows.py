@@ -28,7 +28,7 @@ def _place(rows: ResidualRows) -> str:
         ("azimuth", azimuth_sentence, "Residuals grow to both sides: "),
         ("left", azimuth_sentence, "Residuals grow to the left: "),
         ("column", _place, "Residuals grow to the right edge: "),
-        ("middle", _place, "Residuals grow away from the middle of the picture: "),
+        ("middle", _place, "Residuals grow away from the middle of the image: "),
         ("time", time_sentence, "Residuals grow with time: "),
     ],
 )

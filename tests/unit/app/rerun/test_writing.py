@@ -67,12 +67,12 @@ def read(view: RecordedView, tmp_path_factory: pytest.TempPathFactory) -> Read:
     return Read(path)
 
 
-def test_pictures_are_the_recorded_bytes_at_their_recorded_times(read, view):
-    blobs = read.column("radar/camera/picture", "EncodedImage:blob")
+def test_images_are_the_recorded_bytes_at_their_recorded_times(read, view):
+    blobs = read.column("radar/camera/image", "EncodedImage:blob")
     assert list(blobs) == view.recording.image_times.tolist()
     for index, blob in enumerate(blobs.values()):
         assert bytes(blob.as_py()[0]) == view.recording.image_bytes(index).data
-    kinds = read.column("radar/camera/picture", "EncodedImage:media_type")
+    kinds = read.column("radar/camera/image", "EncodedImage:media_type")
     assert {kind.as_py()[0] for kind in kinds.values()} == {"image/jpeg"}
 
 
@@ -85,18 +85,18 @@ def test_the_camera_stands_where_the_calibration_says(read, view):
 
 
 def test_the_frustum_has_the_camera_matrix_in_reruns_pixels(read, view):
-    matrix = np.array(read.one("radar/camera/picture", "Pinhole:image_from_camera")[0]).reshape(3, 3).T
+    matrix = np.array(read.one("radar/camera/image", "Pinhole:image_from_camera")[0]).reshape(3, 3).T
     camera = view.calibration.camera
     np.testing.assert_allclose(matrix[:2, :2], camera.matrix_px[:2, :2], rtol=1e-6)
     np.testing.assert_allclose(matrix[:2, 2], camera.matrix_px[:2, 2] + 0.5, rtol=1e-6)
-    assert read.one("radar/camera/picture", "Pinhole:resolution")[0] == [camera.width_px, camera.height_px]
+    assert read.one("radar/camera/image", "Pinhole:resolution")[0] == [camera.width_px, camera.height_px]
 
 
 @pytest.mark.parametrize("name", ["returns", "returns_against"])
 def test_returns_lie_where_the_lens_of_the_calibration_projects_them(read, view, name):
     calibration = view.calibration if name == "returns" else view.against
     assert calibration is not None
-    points = read.column(f"radar/camera/picture/{name}", "Points2D:positions")
+    points = read.column(f"radar/camera/image/{name}", "Points2D:positions")
     assert list(points) == view.recording.image_times.tolist()
     drawn = 0
     for time, positions in list(points.items())[::7]:
@@ -128,26 +128,26 @@ def test_residuals_over_time_are_those_of_the_pairs(read, view):
 
 def test_a_click_is_shown_in_its_frame_only(read, view):
     clicked = {int(pair.image_time): pair for pair in view.pairs if pair.image_time is not None}
-    clicks = read.column("radar/camera/picture/clicked_now/click", "Points2D:positions")
+    clicks = read.column("radar/camera/image/clicked_now/click", "Points2D:positions")
     assert set(clicks) == set(clicked)
     for time, place in clicks.items():
         np.testing.assert_allclose(place.as_py()[0], clicked[time].pixel_px + 0.5, atol=1e-4)
     times = view.recording.image_times.tolist()
-    cleared = set(read.column("radar/camera/picture/clicked_now", "Clear:is_recursive"))
+    cleared = set(read.column("radar/camera/image/clicked_now", "Clear:is_recursive"))
     assert {times[times.index(time) + 1] for time in clicked} <= cleared
     assert not cleared & set(clicked)
 
 
 def test_boxes_end_with_the_last_annotated_frame(read, view):
-    centres = read.column("radar/camera/picture/boxes", "Boxes2D:centers")
+    centres = read.column("radar/camera/image/boxes", "Boxes2D:centers")
     counts = [len(centre.as_py()) for centre in centres.values()]
     assert [index for index, count in enumerate(counts) if count] == [3, 4]
     time = int(view.recording.image_times[3])
     assert centres[time].as_py() == [[80.75, 100.5]]
-    assert read.column("radar/camera/picture/boxes", "Boxes2D:labels")[time].as_py() == ["person-1"]
+    assert read.column("radar/camera/image/boxes", "Boxes2D:labels")[time].as_py() == ["person-1"]
 
 
-def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_picture(read, view):
+def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_image(read, view):
     assert read.one("summary", "TextDocument:media_type") == ["text/plain"]
     text = read.one("summary", "TextDocument:text")[0]
     assert text == summary_text(view)

@@ -58,7 +58,7 @@ def test_with_one_frame_only_its_own_stamp_fits():
         clicks_at_frames([click(START_NS + 1)], IMAGE_TIMES[:1], source="clicks.json")
 
 
-def test_clicks_in_the_pictures_of_another_topic_are_refused_with_its_name():
+def test_clicks_in_the_images_of_another_topic_are_refused_with_its_name():
     others = {"/left": IMAGE_TIMES + 20_000_000, "/right": IMAGE_TIMES + 30_000_000}
     clicks = [click(int(time) + 30_000_000, f"c{index}") for index, time in enumerate(IMAGE_TIMES)]
     with pytest.raises(InputError, match=r"clicks.json: its clicks .* of /right, .* --image-topic /right,"):

@@ -1,4 +1,4 @@
-"""A session is found by its recording's content: renamed, moved, grown, or without pictures."""
+"""A session is found by its recording's content: renamed, moved, grown, or without images."""
 
 import os
 import shutil
@@ -105,7 +105,7 @@ def test_a_recording_that_has_grown_keeps_its_session(home):
     assert clicks_in(home / "drive.bag.cocalib-session", FACTS) == [3.0, 40.0]
 
 
-def test_a_recording_without_pictures_is_known_by_its_scans(home):
+def test_a_recording_without_images_is_known_by_its_scans(home):
     facts = RecordingFacts("radar.bag", NO_TIMES, 0, 0, radar_times=RADAR_TIMES[:30])
     kept(home / "radar.bag.cocalib-session", facts=facts)
     grown = replace(facts, radar_times=RADAR_TIMES)

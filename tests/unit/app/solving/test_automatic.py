@@ -13,7 +13,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
-from calib_core.proposing import PictureCandidate, Proposal, Proposals
+from calib_core.proposing import ImageCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import UnconfirmedClicks
 from calib_core.results.actions import MeasureCameraPosition
@@ -37,7 +37,7 @@ def found(monkeypatch: pytest.MonkeyPatch, outcome: object, clicks: object = Non
 
 def one_proposal() -> Proposals:
     placement = Placement(TimeNs(8), TimeNs(10), np.array([5.0, 0.0, 0.0]), 0.9)
-    candidate = PictureCandidate(np.array([7.0, 8.0]), 0.4, 20.0)
+    candidate = ImageCandidate(np.array([7.0, 8.0]), 0.4, 20.0)
     return Proposals((Proposal(placement, TimeNs(9), candidate.pixel_px, 0.4, 0.99, (candidate,)),))
 
 

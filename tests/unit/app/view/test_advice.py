@@ -22,7 +22,7 @@ def advised(calibration: Calibration) -> Advice | None:
     return advice_for(calibration, verdict_on(calibration))
 
 
-def test_the_advised_place_is_in_the_picture_and_in_the_text_with_its_side_as_the_radar_sees_it():
+def test_the_advised_place_is_in_the_image_and_in_the_text_with_its_side_as_the_radar_sees_it():
     calibration = solved(6)
     advice = advised(calibration)
     assert not advice.best.may_stop

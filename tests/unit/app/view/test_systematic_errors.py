@@ -70,13 +70,13 @@ def test_the_command_line_says_the_same_as_the_page(calibration):
         map(str, systematic_errors(calibration).sentences)
     )
     assert " ".join(lines).casefold().count("a tape-measured camera position") == 1
-    assert any(line.startswith("in the picture") for line in lines)
+    assert any(line.startswith("in the image") for line in lines)
     assert assumed_figures(calibration) == ()
 
 
 def test_a_radar_without_elevation_shows_first_what_is_firm(flat):
     figures = {one.key: one.value for one in pose_figures(flat)}
-    assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "picture"]
+    assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "image"]
     assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
     lines = tuple(map(str, summary_lines(flat)))
     labels = [line.split("  ")[0] for line in lines[3:7]]

@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 
 from calib_core.diagnostics.next_placement import Coverage, Place
-from calib_core.intrinsics import Board, LeftOutPicture
+from calib_core.intrinsics import Board, LeftOutImage
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.actions import (
@@ -202,7 +202,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("too-few-pairs", {"used": 2, "needed": 4, "excluded": 1, "unpaired": 0}),
     Unsolvable("stopped"),
     Unsolvable("unreadable", {"why": "radar.bag: chunk 7 is damaged"}),
-    Unsolvable("unreadable", {"why": "left01.png: the file is cut off", "pictures": 20}),
+    Unsolvable("unreadable", {"why": "left01.png: the file is cut off", "images": 20}),
     Unsolvable("useless-lens-covariance"),
     Unsolvable("useless-lens-covariance", {"parameter": "fx_px", "value_px": 700.0, "sigma_px": 400.0}),
     Unsolvable("internal-error", {"fault": "ZeroDivisionError: by zero"}),
@@ -220,7 +220,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("not-confident", {"camera_away_m": 1.2}),
     Unsolvable("nothing-proposed", {"placements": 9}),
     Unsolvable("too-few-placements", {"placements": 1, "needed": 3}),
-    Unsolvable("few-views", {"views": 2, "needed": 3, "left_out": [LeftOutPicture(7, "image 7", "blurred")]}),
+    Unsolvable("few-views", {"views": 2, "needed": 3, "left_out": [LeftOutImage(7, "image 7", "blurred")]}),
     Unsolvable("few-views", {"views": 7, "needed": 8, "halves": True}),
     Unsolvable("mixed-sizes", {"counts": [((640, 480), 9), ((320, 240), 8)]}),
     Unsolvable("no-board", {"board": _BOARD, "searched": 20, "views": 0}),

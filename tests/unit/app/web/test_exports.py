@@ -20,7 +20,7 @@ from calib_core.interchange import (
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.results import CheckPoint
 from cocalib.web.channel.export_preview import export_preview, exported
-from cocalib.web.exports import FieldError, fields_in, our_numbers, picture_of, pose_in_file
+from cocalib.web.exports import FieldError, fields_in, image_of, our_numbers, pose_in_file
 
 NAMES = FrameNames("front_radar", "front_camera_optical")
 
@@ -140,7 +140,7 @@ def test_a_file_without_a_lens_must_give_the_point_in_the_camera_frame(file):
     np.testing.assert_allclose([float(number) for number in at[1].split(", ")], expected, atol=6e-4)
 
 
-def test_a_file_for_rectified_pictures_names_both_pixels(file):
+def test_a_file_for_rectified_images_names_both_pixels(file):
     camera = file.calibration.camera
     lens = Camera("plumb_bob", camera.width_px, camera.height_px, camera.matrix_px, np.array([-0.3, 0.1, 0, 0, 0]))
     calibration = replace(file.calibration, camera=lens)
@@ -155,14 +155,14 @@ def test_a_file_for_rectified_pictures_names_both_pixels(file):
     assert rectified != taken
 
 
-def test_the_picture_is_that_of_the_pair_it_was_chosen_from(file):
+def test_the_image_is_that_of_the_pair_it_was_chosen_from(file):
     pairs = tuple(replace(pair, image_time=index) for index, pair in enumerate(file.calibration.pairs))
     stamped = replace(file, calibration=replace(file.calibration, pairs=pairs))
     errors = stamped.calibration.radar_errors
-    position = errors.corrected(pairs[picture_of(stamped)].point_radar_m[None])[0]
+    position = errors.corrected(pairs[image_of(stamped)].point_radar_m[None])[0]
     np.testing.assert_allclose(position, file.check_point.radar_m, rtol=0, atol=1e-3)
     elsewhere = replace(stamped, check_point=CheckPoint(np.array([50.0, 1.0, 2.0]), np.array([5.0, 5.0])))
-    assert picture_of(elsewhere) is None
+    assert image_of(elsewhere) is None
     assert export_preview(elsewhere, "opencv", "", "drive").check_point.pair == ""
     assert export_preview(replace(file, check_point=None), "tf2", "", "drive").check_point is None
 
@@ -200,9 +200,9 @@ def test_what_cannot_be_used_is_refused_with_the_name_of_its_field(query, field,
     assert (fields.frames, fields.parent_from_radar, fields.rectified) == (FrameNames("r", "c"), None, False)
 
 
-def test_a_lens_that_no_maps_can_rectify_asks_whether_the_pictures_are_rectified(file):
+def test_a_lens_that_no_maps_can_rectify_asks_whether_the_images_are_rectified(file):
     camera = replace(file.calibration.camera, model="plumb_bob", distortion=[-5000.0, 0, 0, 0, 0])
     distorted = replace(file, calibration=replace(file.calibration, camera=camera))
-    with pytest.raises(FieldError, match="no rectified picture") as refused:
+    with pytest.raises(FieldError, match="no rectified image") as refused:
         exported(distorted, "kitti", "")
     assert refused.value.field == "rectified"

@@ -91,7 +91,7 @@ def test_every_message_of_the_page_is_understood_with_and_without_a_request(text
     assert parse(text.encode()) == Incoming(command)
 
 
-def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry():
+def test_a_frame_is_asked_for_with_the_number_its_image_will_carry():
     assert parse('{"type":"frame","index":3,"request":9,"playing":true,"size":"half"}') == Incoming(
         FrameWanted(3, 9, playing=True, size="half")
     )
@@ -225,12 +225,12 @@ def test_a_message_to_the_page_carries_its_type(message, written):
     assert json.loads(encode(message)) == written
 
 
-def test_a_picture_travels_with_its_header_before_its_bytes():
-    message = encode_frame(FrameHeader(3, 9, 640, 480, 0.5, "jpeg"), b"\xff\xd8picture")
+def test_a_image_travels_with_its_header_before_its_bytes():
+    message = encode_frame(FrameHeader(3, 9, 640, 480, 0.5, "jpeg"), b"\xff\xd8image")
     wanted = {"index": 3, "request": 9, "width_px": 640, "height_px": 480, "scale": 0.5, "format": "jpeg"}
     (length,) = struct.unpack("<I", message[:4])
     assert json.loads(message[4 : 4 + length]) == wanted | {"rectified": False}
-    assert message[4 + length :] == b"\xff\xd8picture"
+    assert message[4 + length :] == b"\xff\xd8image"
 
 
 def test_the_types_of_the_page_are_those_of_the_program(project_root):

@@ -18,8 +18,8 @@ def opened(write, ros, *messages, **options):
     return open_recording(write(ros, rows), RecordingOptions(**options), require=("image",))
 
 
-def picture(height: int = 24, width: int = 32) -> np.ndarray:
-    """Return a picture of smooth colours, blue first."""
+def image(height: int = 24, width: int = 32) -> np.ndarray:
+    """Return an image of smooth colours, blue first."""
     v, u = np.mgrid[:height, :width]
     return np.stack([u * 255 // width, v * 255 // height, 255 - u * 127 // width], axis=2).astype(np.uint8)
 
@@ -33,14 +33,14 @@ def test_a_jpeg_is_passed_through_byte_for_byte_whatever_the_format_says(ros, wr
 
 
 def test_a_png_is_passed_through_byte_for_byte(ros, write):
-    data = cv2.imencode(".png", picture())[1].tobytes()
+    data = cv2.imencode(".png", image())[1].tobytes()
     with opened(write, ros, ros.compressed(START_NS, data, "jpeg")) as recording:
         frame = recording.image_bytes(0)
         assert (frame.data, frame.format, frame.width_px, frame.height_px) == (data, "png", 32, 24)
-        np.testing.assert_array_equal(recording.image(0), picture())
+        np.testing.assert_array_equal(recording.image(0), image())
 
 
-def test_an_orientation_in_the_exif_block_does_not_rotate_the_picture(ros, write, jpeg):
+def test_an_orientation_in_the_exif_block_does_not_rotate_the_image(ros, write, jpeg):
     turned = jpeg[:2] + EXIF_TURNED + jpeg[2:]
     assert cv2.imdecode(np.frombuffer(turned, dtype=np.uint8), cv2.IMREAD_COLOR).shape == (64, 48, 3)
     with opened(write, ros, ros.compressed(START_NS, turned)) as recording:
@@ -56,7 +56,7 @@ def test_a_missing_end_marker_is_added(ros, write, jpeg):
 
 
 @pytest.mark.parametrize("cut", [0, 2, 3, 30])
-def test_a_jpeg_cut_before_its_picture_is_refused(jpeg, cut):
+def test_a_jpeg_cut_before_its_image_is_refused(jpeg, cut):
     with pytest.raises(MessageError):
         repaired_jpeg(jpeg[:cut])
 
@@ -64,11 +64,11 @@ def test_a_jpeg_cut_before_its_picture_is_refused(jpeg, cut):
 @pytest.mark.parametrize(
     ("encoding", "pixels"),
     [
-        ("bgr8", picture()),
-        ("rgb8", cv2.cvtColor(picture(), cv2.COLOR_BGR2RGB)),
-        ("bgra8", cv2.cvtColor(picture(), cv2.COLOR_BGR2BGRA)),
-        ("rgba8", cv2.cvtColor(picture(), cv2.COLOR_BGR2RGBA)),
-        ("8UC3", picture()),
+        ("bgr8", image()),
+        ("rgb8", cv2.cvtColor(image(), cv2.COLOR_BGR2RGB)),
+        ("bgra8", cv2.cvtColor(image(), cv2.COLOR_BGR2BGRA)),
+        ("rgba8", cv2.cvtColor(image(), cv2.COLOR_BGR2RGBA)),
+        ("8UC3", image()),
     ],
 )
 def test_raw_colour_images_keep_their_pixels_and_padded_rows_are_cut(ros, write, encoding, pixels):
@@ -76,15 +76,15 @@ def test_raw_colour_images_keep_their_pixels_and_padded_rows_are_cut(ros, write,
     rows = np.pad(pixels.reshape(height, width * channels), ((0, 0), (0, 5)), constant_values=77)
     message = ros.image(START_NS, rows, encoding, width=width)
     with opened(write, ros, message) as recording:
-        np.testing.assert_array_equal(recording.image(0), picture())
+        np.testing.assert_array_equal(recording.image(0), image())
         frame = recording.image_bytes(0)
         assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", width, height)
         back = cv2.imdecode(np.frombuffer(frame.data, dtype=np.uint8), cv2.IMREAD_COLOR)
-        assert np.abs(back.astype(int) - picture()).mean() < 2.0
+        assert np.abs(back.astype(int) - image()).mean() < 2.0
 
 
-def test_grey_images_become_grey_pictures(ros, write):
-    grey = picture()[:, :, 0]
+def test_grey_images_become_grey_images(ros, write):
+    grey = image()[:, :, 0]
     with opened(write, ros, ros.image(START_NS, grey, "mono8")) as recording:
         np.testing.assert_array_equal(recording.image(0), np.repeat(grey[:, :, None], 3, axis=2))
 
@@ -176,7 +176,7 @@ def test_unsupported_raw_encodings_are_refused_with_a_clear_error(ros, write, en
     ("data", "form", "words"),
     [
         (b"qoif" + bytes(40), "rgb8; qoi", "the encoding 'qoi' is not supported; record in jpeg or png"),
-        (bytes(12) + b"\x89PNG" + bytes(40), "16UC1; compressedDepth", "is a depth image, not a picture"),
+        (bytes(12) + b"\x89PNG" + bytes(40), "16UC1; compressedDepth", "is a depth image, not an image"),
         (b"RIFF1234WEBP" + bytes(40), "webp", "the encoding 'webp' is not supported"),
         (b"", "jpeg", "declared as 'jpeg', but the data is neither JPEG nor PNG"),
         (b"\xff\xd8\xff\xe0", "jpeg", "the JPEG ends before its image data"),
@@ -204,7 +204,7 @@ def test_unreadable_compressed_images_are_refused_with_a_clear_error(ros, write,
     ],
 )
 def test_images_with_inconsistent_sizes_are_refused(ros, write, changes, words):
-    message = ros.image(START_NS, picture()[:, :, 0], "mono8", **changes)
+    message = ros.image(START_NS, image()[:, :, 0], "mono8", **changes)
     with pytest.raises(RecordingError) as caught:
         opened(write, ros, message)
     assert words in str(caught.value)
@@ -219,12 +219,12 @@ def test_one_damaged_frame_does_not_affect_the_others(ros, write, jpeg):
         assert [recording.image_bytes(index).data for index in range(2)] == [jpeg, jpeg]
         (warning,) = recording.warnings
         assert warning.code == "unreadable-pictures"
-        assert warning.facts["message"].startswith("1 of 3 pictures ")
+        assert warning.facts["message"].startswith("1 of 3 images ")
         assert "(2023-11-14 22:13:20.100" in warning.facts["message"]
 
 
 @pytest.mark.parametrize("count", [6, 200])
-def test_pictures_of_another_size_are_skipped_and_told_with_their_times(count, ros, write, jpeg):
+def test_images_of_another_size_are_skipped_and_told_with_their_times(count, ros, write, jpeg):
     large = cv2.imencode(".jpg", np.zeros((96, 128, 3), dtype=np.uint8))[1].tobytes()
     odd = range(2, count, 5)
     messages = [ros.compressed(START_NS + i * 10**8, large if i in odd else jpeg) for i in range(count)]
@@ -237,7 +237,7 @@ def test_pictures_of_another_size_are_skipped_and_told_with_their_times(count, r
     assert f"{len(odd)} have 128 x 96 (2023-11-14" in warning.facts["message"]
 
 
-def test_raw_pictures_of_another_size_are_skipped(ros, write):
+def test_raw_images_of_another_size_are_skipped(ros, write):
     small, large = np.zeros((8, 12), dtype=np.uint8), np.zeros((16, 24), dtype=np.uint8)
     messages = [ros.image(START_NS + i * 10**8, large if i == 2 else small, "mono8") for i in range(5)]
     with opened(write, ros, *messages) as recording:
@@ -245,7 +245,7 @@ def test_raw_pictures_of_another_size_are_skipped(ros, write):
         assert [warning.code for warning in recording.warnings] == ["picture-sizes"]
 
 
-def test_a_single_picture_of_another_size_in_a_long_recording_is_refused_when_it_is_read(ros1, write, jpeg):
+def test_a_single_image_of_another_size_in_a_long_recording_is_refused_when_it_is_read(ros1, write, jpeg):
     large = cv2.imencode(".jpg", np.zeros((96, 128, 3), dtype=np.uint8))[1].tobytes()
     messages = [ros1.compressed(START_NS + i * 10**8, large if i == 1 else jpeg) for i in range(300)]
     with opened(write, ros1, *messages) as recording:

@@ -20,19 +20,19 @@ KEY_EVERY = 10
 
 
 def striped(number: int) -> np.ndarray:
-    """Write a number into a picture: eight stripes, one per bit."""
+    """Write a number into an image: eight stripes, one per bit."""
     bits = [255 if number >> bit & 1 else 0 for bit in range(8)]
     return np.repeat(np.repeat(np.array(bits, dtype=np.uint8), 16)[None, :, None], 64, axis=0).repeat(3, axis=2)
 
 
-def number_in(picture: np.ndarray) -> int:
-    bits = picture.mean(axis=(0, 2)).reshape(8, 16).mean(axis=1) > 127
+def number_in(image: np.ndarray) -> int:
+    bits = image.mean(axis=(0, 2)).reshape(8, 16).mean(axis=1) > 127
     return int(sum(1 << bit for bit in range(8) if bits[bit]))
 
 
 @pytest.fixture(scope="module", params=["h264", "hevc"])
 def coded(request: pytest.FixtureRequest) -> tuple[str, list[bytes]]:
-    """Return the codec and one encoded frame per picture, as an encoder on a robot sends them."""
+    """Return the codec and one encoded frame per image, as an encoder on a robot sends them."""
     codec = str(request.param)
     context: Any = av.CodecContext.create({"h264": "libx264", "hevc": "libx265"}[codec], "w")
     context.width, context.height, context.pix_fmt, context.time_base = 128, 64, "yuv420p", Fraction(1, 10)

@@ -57,7 +57,7 @@ class Sound:
 
 
 def sound(kind: str, folder: Path) -> Sound:
-    """Write a recording of radar clouds and pictures."""
+    """Write a recording of radar clouds and images."""
     container, _, shape = kind.partition("-")
     ros = Ros(1 if container == "bag" else 2)
     rows = [

@@ -38,7 +38,7 @@ def _bomb(compress: Callable[[bytes], bytes]) -> bytes:
 
 @dataclass(frozen=True)
 class Kit:
-    """The materials of a case: its own folder, and one picture."""
+    """The materials of a case: its own folder, and one image."""
 
     folder: Path
     jpeg: bytes
@@ -124,7 +124,7 @@ def bag_lz4_damaged_and_never_closed(kit: Kit) -> Path:
 @case
 def bag_with_a_garbled_record(kit: Kit) -> Path:
     def change(raw: bytearray) -> None:
-        """Damage the head of a picture's record."""
+        """Damage the head of an image's record."""
         for found in re.finditer(rb"\x26\x00\x00\x00(?=[\x00-\xff]{0,32}op=\x02)", raw[chunk_places(raw)[2] :]):
             place = chunk_places(raw)[2] + found.start()
             if struct.unpack_from("<I", raw, place + 42)[0] > 1000:

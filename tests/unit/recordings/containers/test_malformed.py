@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from calib_core.errors import RecordingError
-from calib_core.recordings import describe, first_picture, inspect_recording
+from calib_core.recordings import describe, first_image, inspect_recording
 from calib_core.words import told
 from tests.unit.recordings.containers.malformed import CASES, FRAMES, Kit
 
@@ -35,29 +35,29 @@ LOSSLESS = {
 """Unusual recordings that are read without losses and without warnings."""
 
 EXPECTED: dict[str, list[Any]] = json.loads(Path(__file__).with_name("malformed_expected.json").read_text())
-"""Number of scans, number of pictures, and all messages: warnings, topic problems, or the error."""
+"""Number of scans, number of images, and all messages: warnings, topic problems, or the error."""
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_complete_messages_are_recovered_losses_are_reported_and_a_first_picture_is_complete_or_none(
+def test_complete_messages_are_recovered_losses_are_reported_and_a_first_image_is_complete_or_none(
     name, tmp_path, jpeg
 ):
     path = CASES[name](Kit(tmp_path, jpeg))
-    scans = pictures = 0
-    first = first_picture([path])
+    scans = images = 0
+    first = first_image([path])
     assert first is None or first.data == jpeg
     try:
         with inspect_recording(path) as recording:
             scans = len(recording.radar_scans())
-            pictures = sum(_picture(recording, index) == jpeg for index in range(len(recording.image_times)))
+            images = sum(_image(recording, index) == jpeg for index in range(len(recording.image_times)))
             said = [f"{warning.code}: {told(warning).message}" for warning in recording.warnings]
             said += [t.problem for t in recording.topics if t.problem and t.problem != "no messages"]
     except RecordingError as error:
         said = [str(error)]
-    assert [scans, pictures, [text.replace(str(tmp_path), "FOLDER") for text in said]] == EXPECTED[name]
+    assert [scans, images, [text.replace(str(tmp_path), "FOLDER") for text in said]] == EXPECTED[name]
 
 
-def _picture(recording, index):
+def _image(recording, index):
     try:
         return recording.image_bytes(index).data
     except RecordingError:
@@ -67,8 +67,8 @@ def _picture(recording, index):
 def test_there_is_no_silent_loss():
     assert len(CASES) >= 45
     assert CASES.keys() == EXPECTED.keys()
-    for name, (scans, pictures, said) in EXPECTED.items():
-        if (scans, pictures) != (FRAMES, FRAMES):
+    for name, (scans, images, said) in EXPECTED.items():
+        if (scans, images) != (FRAMES, FRAMES):
             assert said, name
         assert bool(said) != (name in LOSSLESS), name
 
@@ -111,7 +111,7 @@ def _read_everything(path):
             recording.radar_scans()
             describe(recording)
             for index in range(len(recording.image_times)):
-                _picture(recording, index)
+                _image(recording, index)
     except RecordingError as error:
         assert len(str(error)) > 40  # noqa: PT017
 

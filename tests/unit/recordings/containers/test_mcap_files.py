@@ -6,7 +6,7 @@ import pytest
 
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings import RecordingOptions, first_picture, inspect_recording, open_recording, verify_recording
+from calib_core.recordings import RecordingOptions, first_image, inspect_recording, open_recording, verify_recording
 from tests.unit.recordings.containers.mcap_writing import mcap
 
 CHUNK_ROWS = 15  # 5 clouds, 5 frames and 5 camera infos in each chunk
@@ -58,7 +58,7 @@ def test_verification_checks_stored_chunks_of_a_file_without_a_summary(ros2, pla
     assert [warning.code for warning in found.warnings] == ["checksum"]
 
 
-def test_a_flipped_byte_in_a_picture_gives_a_warning(ros2, plain, jpeg, tmp_path):
+def test_a_flipped_byte_in_a_image_gives_a_warning(ros2, plain, jpeg, tmp_path):
     def flip(data):
         data[data.index(jpeg, data.index(jpeg, len(data) // 2) + 1) + len(jpeg) // 2] ^= 1
 
@@ -124,7 +124,7 @@ def test_a_chunk_that_claims_to_be_longer_than_any_file_is_skipped(claimed, ros2
     data[place + 8 : place + 16] = struct.pack("<Q", claimed)
     path = tmp_path / "made.mcap"
     path.write_bytes(data)
-    assert first_picture([path]) is None
+    assert first_image([path]) is None
     with open_recording(path) as recording:
         assert len(recording.radar_times) == len(recording.image_times) == 20
         assert [warning.code for warning in recording.warnings] == ["not-closed"]

@@ -120,7 +120,7 @@ def folder_of(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-def test_pictures_whose_digits_are_open_are_an_assumption(tmp_path):
+def test_images_whose_digits_are_open_are_an_assumption(tmp_path):
     names = names_of(TEN_HZ, lambda n, m: f"{m:%Y%m%d_%H%M%S}_{n:06d}.png")
     folder = folder_of(tmp_path / "camera", names)
     with open_recording(folder, require=("image",)) as recording:
@@ -145,12 +145,12 @@ def test_local_times_are_moved_by_the_given_zone(tmp_path):
         assert recording.image_times[0] == MOMENT_NS - 7200 * NS_PER_S
 
 
-def test_a_folder_without_any_readable_picture_is_refused(tmp_path):
+def test_a_folder_without_any_readable_image_is_refused(tmp_path):
     folder = tmp_path / "camera"
     folder.mkdir()
     (folder / "1715938951208.jpg").write_bytes(b"")
     (folder / "1715938951308.jpg").write_text("<html>not found</html>")
-    with pytest.raises(RecordingError, match=r"none of its 2 pictures can be read: 1715938951208\.jpg has no bytes"):
+    with pytest.raises(RecordingError, match=r"none of its 2 images can be read: 1715938951208\.jpg has no bytes"):
         open_recording(folder, require=("image",))
 
 
@@ -159,10 +159,10 @@ def test_a_folder_without_any_readable_picture_is_refused(tmp_path):
     [
         (lambda data: b"", "has no bytes"),
         (lambda data: data[: len(data) // 2], "is cut off"),
-        (lambda data: b"<html>" + data, "is not a picture (it begins with 3c68746d)"),
+        (lambda data: b"<html>" + data, "is not an image (it begins with 3c68746d)"),
     ],
 )
-def test_pictures_that_cannot_be_read_are_counted_and_named(tmp_path, damage, words):
+def test_images_that_cannot_be_read_are_counted_and_named(tmp_path, damage, words):
     folder = folder_of(tmp_path / "camera", [f"{MOMENT_NS + n}.png" for n in range(5)])
     for number in (1, 3):
         path = folder / f"{MOMENT_NS + number}.png"
@@ -171,5 +171,5 @@ def test_pictures_that_cannot_be_read_are_counted_and_named(tmp_path, damage, wo
         assert len(recording.image_times) == 3
         (warning,) = recording.warnings
     assert warning.code == "unreadable-pictures"
-    assert warning.facts["message"].startswith("2 of 5 pictures ")
+    assert warning.facts["message"].startswith("2 of 5 images ")
     assert words in warning.facts["message"]

@@ -1,4 +1,4 @@
-"""Folders of pictures and radar files, radar CSV and videos as recordings."""
+"""Folders of images and radar files, radar CSV and videos as recordings."""
 
 import json
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def pixels(number: int = 0) -> np.ndarray:
     return np.stack([u * 3, v * 4, np.full_like(u, 40 + 20 * number)], axis=2).astype(np.uint8)
 
 
-def pictures(folder: Path, names: list[str]) -> Path:
+def images(folder: Path, names: list[str]) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for number, name in enumerate(names):
         assert cv2.imwrite(str(folder / name), pixels(number))
@@ -83,10 +83,10 @@ def test_invalid_times_are_refused(text, words):
         read_time(text)
 
 
-# -- pictures
-def test_a_folder_of_pictures_is_a_camera(tmp_path):
+# -- images
+def test_a_folder_of_images_is_a_camera(tmp_path):
     names = [f"{START_NS + i * 10**8}.{suffix}" for i, suffix in enumerate(["jpg", "png", "bmp", "jpg"])]
-    folder = pictures(tmp_path / "front", names)
+    folder = images(tmp_path / "front", names)
     with open_recording(folder, require=("image",)) as recording:
         assert recording.image_topic == "/front/image"
         assert recording.camera_frame == "camera"
@@ -105,7 +105,7 @@ def test_a_folder_of_pictures_is_a_camera(tmp_path):
 def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path):
     import hashlib
 
-    folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
+    folder = images(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
     whole = b"".join(path.read_bytes() for path in sorted(folder.iterdir()))
     with open_recording(folder, require=("image",)) as recording:
         assert recording.fingerprint()[0].sha256 == hashlib.sha256(whole).hexdigest()
@@ -124,7 +124,7 @@ def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path):
     ],
 )  # fmt: skip
 def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text):
-    folder = pictures(tmp_path / "front", ["b.png", "a.png"])
+    folder = images(tmp_path / "front", ["b.png", "a.png"])
     radar_csv(tmp_path / table, text)
     with open_recording(folder, require=("image",)) as recording:
         assert recording.image_times.tolist() == [START_NS, START_NS + NS_PER_S]
@@ -133,7 +133,7 @@ def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text):
 
 def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path):
     """As in RADIATE: five stills minutes apart, and their times beside the folder."""
-    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 40, 92, 137, 201)])
+    folder = images(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 40, 92, 137, 201)])
     seconds = {number: 1_574_859_772 + 19 * number for number in range(1, 205)}
     lines = [f"Frame: {number:06} Time: {second}.427742418\n" for number, second in seconds.items()]
     (tmp_path / "zed_left.txt").write_text("".join(lines))
@@ -152,7 +152,7 @@ def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path):
     """Neither those of the camera in use, nor of the other one, nor the radar's."""
     numbers = (1, 15, 29, 43, 570)
     for folder in ("zed_left", "zed_right"):
-        pictures(tmp_path / folder, [f"{number:06}.png" for number in numbers])
+        images(tmp_path / folder, [f"{number:06}.png" for number in numbers])
     for folder, seed in (("front", 4), ("rear", 5)):
         bin_folder(tmp_path / folder, [bin_rows("delft", 40, seed) for _ in numbers])
     with open_recording(tmp_path) as recording:
@@ -167,7 +167,7 @@ def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path):
 
 
 def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path):
-    folder = pictures(tmp_path / "image_02" / "data", ["0000000003.png", "0000000007.png"])
+    folder = images(tmp_path / "image_02" / "data", ["0000000003.png", "0000000007.png"])
     (tmp_path / "image_02" / "timestamps.txt").write_text(
         "".join(f"2011-09-26 13:02:{second:02}.964389445\n" for second in range(9))
     )
@@ -175,17 +175,17 @@ def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path):
         assert (recording.image_times % (60 * NS_PER_S)).tolist() == [3_964_389_445, 7_964_389_445]
 
 
-@pytest.mark.parametrize("stamped", ["pictures", "radar"])
+@pytest.mark.parametrize("stamped", ["images", "radar"])
 @pytest.mark.parametrize(("spelling", "what"), [("{:06}", "names"), ("frame{:03}", "numbers")])
 def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, spelling, what):
-    pictures(tmp_path / "image_2", [f"{number:06}.png" for number in (4, 5, 9)])
+    images(tmp_path / "image_2", [f"{number:06}.png" for number in (4, 5, 9)])
     radar = bin_folder(tmp_path / "radar", [bin_rows("delft", 5) for _ in range(3)])
     for path, number in zip(sorted(radar.iterdir()), (4, 5, 9), strict=True):
         path.rename(radar / f"{spelling.format(number)}.new")
     for path in radar.iterdir():
         path.rename(path.with_suffix(".bin"))
-    names = {"pictures": "{:06}", "radar": spelling}[stamped]
-    folder = {"pictures": tmp_path / "image_2", "radar": radar}[stamped]
+    names = {"images": "{:06}", "radar": spelling}[stamped]
+    folder = {"images": tmp_path / "image_2", "radar": radar}[stamped]
     rows = "".join(f"{names.format(number)},{START_NS + number * 10**9}\n" for number in (4, 5, 9))
     folder.with_suffix(".csv").write_text(f"file,time_ns\n{rows}")
     with open_recording(tmp_path) as recording:
@@ -196,8 +196,8 @@ def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, s
 
 
 def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path):
-    """A lidar's tables with one and the same time in all of them, beside pictures and a radar's without any."""
-    pictures(tmp_path / "camera_front", [f"{number:06}.png" for number in range(4)])
+    """A lidar's tables with one and the same time in all of them, beside images and a radar's without any."""
+    images(tmp_path / "camera_front", [f"{number:06}.png" for number in range(4)])
     for folder, head, row in (
         ("lidar", "x_m y_m z_m time_s", "1 2 3 6"),
         ("radar", "x_m y_m z_m doppler_mps", "9 2 3 1"),
@@ -211,8 +211,8 @@ def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path):
         assert len(set(recording.image_times.tolist())) == 4
 
 
-def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path):
-    folder = pictures(tmp_path / "front", [f"{START_NS}.png", "notes.png", "zebra.png"])
+def test_images_without_a_time_are_skipped_with_a_warning(tmp_path):
+    folder = images(tmp_path / "front", [f"{START_NS}.png", "notes.png", "zebra.png"])
     with open_recording(folder, require=("image",)) as recording:
         assert len(recording.image_times) == 1
         (warning,) = recording.warnings
@@ -220,14 +220,14 @@ def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path):
     assert "the first is notes.png" in warning.facts["message"]
 
 
-def test_pictures_without_any_times_are_refused_with_a_clear_error(tmp_path):
-    text = refusal(pictures(tmp_path / "front", ["a.png", "b.png"]))
+def test_images_without_any_times_are_refused_with_a_clear_error(tmp_path):
+    text = refusal(images(tmp_path / "front", ["a.png", "b.png"]))
     assert "no times in the file names (a.png)" in text
     assert "add a CSV with the columns file,time_ns to the folder" in text
 
 
-def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path):
-    folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(4)])
+def test_a_image_of_another_size_in_a_folder_is_skipped_and_told(tmp_path):
+    folder = images(tmp_path / "front", [f"{START_NS + i}.png" for i in range(4)])
     cv2.imwrite(str(folder / f"{START_NS + 1}.png"), np.zeros((200, 300, 3), dtype=np.uint8))
     with open_recording(folder, require=("image",)) as recording:
         assert recording.image_times.tolist() == [START_NS, START_NS + 2, START_NS + 3]
@@ -361,13 +361,13 @@ def test_an_ambiguous_csv_is_refused_with_a_clear_error(tmp_path, text, words):
 
 # -- videos
 def striped(number: int) -> np.ndarray:
-    """Write a number into a picture: eight stripes, one per bit."""
+    """Write a number into an image: eight stripes, one per bit."""
     bits = [255 if number >> bit & 1 else 0 for bit in range(8)]
     return np.repeat(np.repeat(np.array(bits, dtype=np.uint8), 8)[None, :, None], 48, axis=0).repeat(3, axis=2)
 
 
-def number_in(picture: np.ndarray) -> int:
-    bits = picture.mean(axis=(0, 2)).reshape(8, 8).mean(axis=1) > 127
+def number_in(image: np.ndarray) -> int:
+    bits = image.mean(axis=(0, 2)).reshape(8, 8).mean(axis=1) > 127
     return int(sum(1 << bit for bit in range(8) if bits[bit]))
 
 
@@ -419,15 +419,15 @@ def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_p
 
 
 def test_folders_with_the_same_name_stay_separate_topics(tmp_path):
-    folders = [pictures(tmp_path / side / "images", [f"{START_NS}.png"]) for side in ("left", "right")]
+    folders = [images(tmp_path / side / "images", [f"{START_NS}.png"]) for side in ("left", "right")]
     with open_recording(folders, require=("image",)) as recording:
         assert [topic.name for topic in recording.topics] == ["/images/image", "/right/images/image"]
 
 
 def test_mixed_folders_and_single_files_are_explained(tmp_path):
-    mixed = pictures(tmp_path / "mixed", [f"{START_NS}.png"])
+    mixed = images(tmp_path / "mixed", [f"{START_NS}.png"])
     (mixed / "a.pcd").write_bytes(b"")
-    assert "put pictures and radar files into separate folders" in refusal(mixed)
+    assert "put images and radar files into separate folders" in refusal(mixed)
     assert "open the folder with all such files" in refusal(mixed / f"{START_NS}.png")
 
 
@@ -446,7 +446,7 @@ def test_times_that_no_message_can_represent_are_refused_with_a_clear_error(tmp_
 def test_the_folder_of_a_data_set_opens_its_contents(tmp_path, ros1, write, plain, jpeg):
     root = tmp_path / "drive"
     root.mkdir()
-    pictures(root / "camera", ["a.png", "b.png"])
+    images(root / "camera", ["a.png", "b.png"])
     radar_csv(root / "camera.csv", f"file,time_ns\na.png,{START_NS}\nb.png,{START_NS + 10**8}\n")
     radar_csv(root / "radar.csv", f"time_ns,x_m,y_m,z_m,doppler_mps\n{START_NS},1,2,3,0\n{START_NS},2,2,2,0\n")
     (root / "empty").mkdir()
@@ -458,13 +458,13 @@ def test_the_folder_of_a_data_set_opens_its_contents(tmp_path, ros1, write, plai
         assert recording.radar_topic == "/radar/points"  # ROS recordings take precedence
 
 
-# Folders of data sets: their pictures, radar and intrinsics are found, and what is not used is named.
+# Folders of data sets: their images, radar and intrinsics are found, and what is not used is named.
 
 K = np.array([[1495.47, 0, 961.27], [0, 1495.47, 624.9], [0, 0, 1]])
 SIZE = (1936, 1216)
 
 
-def picture(path: Path, size_px: tuple[int, int] = SIZE) -> None:
+def image(path: Path, size_px: tuple[int, int] = SIZE) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     assert cv2.imwrite(str(path), np.zeros((size_px[1], size_px[0], 3), np.uint8))
 
@@ -491,7 +491,7 @@ def floats_bin(path: Path, count: int, columns: int) -> None:
 
 def view_of_delft(root: Path, count: int = 3) -> Path:
     for number in range(count):
-        picture(root / "radar" / "training" / "image_2" / f"{number:05}.jpg")
+        image(root / "radar" / "training" / "image_2" / f"{number:05}.jpg")
         floats_bin(root / "radar" / "training" / "velodyne" / f"{number:05}.bin", 5 + number, 7)
         floats_bin(root / "lidar" / "training" / "velodyne" / f"{number:05}.bin", 101 + number, 4)
         calib = root / "radar" / "training" / "calib" / f"{number:05}.txt"
@@ -538,7 +538,7 @@ def kitti_raw(root: Path, *, rectified: bool) -> tuple[Path, np.ndarray]:
         f"S_rect_02: {numbers(np.array(rect_size))}\nP_rect_02: {numbers(np.hstack([rect, np.ones((3, 1))]))}\n"
     )
     for number in range(3):
-        picture(drive / "image_02" / "data" / f"{number:010}.png", rect_size if rectified else size)
+        image(drive / "image_02" / "data" / f"{number:010}.png", rect_size if rectified else size)
         floats_bin(drive / "velodyne_points" / "data" / f"{number:010}.bin", 99 + number, 4)
     stamps = "".join(f"2011-09-26 13:02:2{number}.964389445\n" for number in range(3))
     (drive / "image_02" / "timestamps.txt").write_text(stamps)
@@ -571,7 +571,7 @@ def nuscenes_data_set(root: Path) -> Path:
             name = f"n008-2018-08-01-15-16-36-0400__{channel}__{1533151603512404 + 500_000 * number}"
             path = root / "samples" / channel / name
             if channel.startswith("CAM"):
-                picture(path.with_suffix(".jpg"), (160, 90))
+                image(path.with_suffix(".jpg"), (160, 90))
             elif channel.startswith("LIDAR"):
                 floats_bin(path.with_suffix(".pcd.bin"), 28, 5)
             else:
@@ -625,7 +625,7 @@ def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path):
 
 # -- nothing vanishes
 def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path):
-    picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
+    image(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     (tmp_path / "label_2").mkdir()
     for number in range(30):
         (tmp_path / "label_2" / f"{number:06}.txt").write_text("Car 0.00 0 1.85 387.63 181.54 423.81 203.12 1.67\n")
@@ -636,7 +636,7 @@ def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path):
 
 def test_numbers_beside_real_times_are_an_assumption(tmp_path):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{number}.png", (8, 8))
+        image(tmp_path / "camera" / f"{number}.png", (8, 8))
     (tmp_path / "radar.csv").write_text("time_s,x_m,y_m\n1.0,3,1\n1.2,3,1\n")
     with open_recording(tmp_path) as recording:
         (assumption,) = recording.assumptions
@@ -645,15 +645,15 @@ def test_numbers_beside_real_times_are_an_assumption(tmp_path):
 
 def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
-        picture(tmp_path / "thumbnails" / f"{'abc'[number]}.png", (8, 8))
+        image(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+        image(tmp_path / "thumbnails" / f"{'abc'[number]}.png", (8, 8))
     (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
     (tmp_path / "imu.csv").write_text("time_ns,gyro_x,gyro_y\n1,2,3\n")
     (tmp_path / "objects.json").write_text('{"boxes": "none"}')
     clicks = '{"id": "c1", "image_time": {"sec": 1, "nanosec": 2}, "pixel_px": [3, 4]}'
     (tmp_path / "clicks.json").write_text(f'{{"schema": "cocalib/clicks-1", "clicks": [{clicks}]}}')
     mixed = tmp_path / "mixed"
-    picture(mixed / f"{START_NS}.png", (8, 8))
+    image(mixed / f"{START_NS}.png", (8, 8))
     (mixed / "a.pcd").write_bytes(b"")
     (tmp_path / "sub" / "bag").mkdir(parents=True)
     (tmp_path / "sub" / "bag" / "a.bag").write_bytes(b"")
@@ -672,9 +672,9 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path):
         assert words in warning.facts["message"]
 
 
-def test_pictures_with_wrong_checksums_are_named(tmp_path):
+def test_images_with_wrong_checksums_are_named(tmp_path):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+        image(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
     damaged = tmp_path / "camera" / f"{START_NS + 2}.png"
     data = damaged.read_bytes()
     damaged.write_bytes(data[:45] + bytes([data[45] ^ 1]) + data[46:])
@@ -691,7 +691,7 @@ def test_pictures_with_wrong_checksums_are_named(tmp_path):
 )
 def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_silence(tmp_path, end, words):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+        image(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
         (tmp_path / "radar").mkdir(exist_ok=True)
         (tmp_path / "radar" / f"{START_NS + number}.csv").write_bytes(b"x_m,y_m\n" + (end if number == 1 else b"3,1\n"))
     with pytest.raises(RecordingError, match=words), open_recording(tmp_path) as recording:
@@ -713,9 +713,9 @@ def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
     """As in Oxford Radar RobotCar, RadarScenes, CARRADA and Dual Radar: echoes, arrays, other floats, times of no known unit."""
     rng = np.random.default_rng(3)
     for number in range(4):
-        picture(tmp_path / "stereo" / f"{START_NS // 1000 + number * 62_500}.png", (8, 8))
-        picture(tmp_path / "radar" / f"{START_NS // 1000 + number * 250_000}.png", (8, 8))
-        picture(tmp_path / "documentary" / f"{156_862_647_501 + number * 100_000}.jpg", (8, 8))
+        image(tmp_path / "stereo" / f"{START_NS // 1000 + number * 62_500}.png", (8, 8))
+        image(tmp_path / "radar" / f"{START_NS // 1000 + number * 250_000}.png", (8, 8))
+        image(tmp_path / "documentary" / f"{156_862_647_501 + number * 100_000}.jpg", (8, 8))
         rows = np.column_stack([*rng.uniform(3, 30, (3, 90)), rng.normal(0, 2, (5, 90)).T]).astype("<f4")
         (tmp_path / "ars548").mkdir(exist_ok=True)
         (tmp_path / "ars548" / f"{number:06}.bin").write_bytes(rows.tobytes())
@@ -725,7 +725,7 @@ def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
         assert (recording.image_topic, recording.radar_topic) == ("/stereo/image", None)
         (warning,) = (one for one in recording.warnings if one.code == "unused-files")
     for words in (
-        "radar (4 pictures of a radar's echoes by its name",
+        "radar (4 images of a radar's echoes by its name",
         "documentary (no times in the file names",
         "ars548 (its 4 .bin files fit no layout of radar returns",
         "maps (1 .npy files, which are not read",
@@ -734,7 +734,7 @@ def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
 
 
 def test_a_link_to_a_folder_above_is_named_and_not_followed(tmp_path):
-    picture(tmp_path / "drive" / "camera" / f"{START_NS}.png", (8, 8))
+    image(tmp_path / "drive" / "camera" / f"{START_NS}.png", (8, 8))
     radar_csv(tmp_path / "drive" / "radar.csv", f"time_ns,x_m,y_m\n{START_NS},3,1\n")
     (tmp_path / "drive" / "again").symlink_to(tmp_path / "drive")
     with open_recording(tmp_path / "drive") as recording:
@@ -743,9 +743,9 @@ def test_a_link_to_a_folder_above_is_named_and_not_followed(tmp_path):
     assert "again (a link " in warning.facts["message"]
 
 
-def test_a_picture_that_is_no_file_is_named(tmp_path):
+def test_a_image_that_is_no_file_is_named(tmp_path):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+        image(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
     (tmp_path / "camera" / f"{START_NS + 9}.png").mkdir()
     (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
     with open_recording(tmp_path) as recording:
@@ -773,7 +773,7 @@ def test_a_table_that_is_a_broken_link_is_named_and_one_that_cannot_be_read_is_a
 
 def test_a_cut_off_jpeg_is_told_and_shown(tmp_path):
     for number in range(3):
-        picture(tmp_path / "camera" / f"{START_NS + number}.jpg", (64, 64))
+        image(tmp_path / "camera" / f"{START_NS + number}.jpg", (64, 64))
     cut = tmp_path / "camera" / f"{START_NS + 1}.jpg"
     cut.write_bytes(cut.read_bytes()[:-20])
     with inspect_recording(tmp_path / "camera") as recording:
@@ -783,7 +783,7 @@ def test_a_cut_off_jpeg_is_told_and_shown(tmp_path):
 
 
 def test_a_long_list_of_unused_files_is_cut(tmp_path):
-    picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
+    image(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     for number in range(20):
         (tmp_path / f"log{'abcdefghijklmnopqrst'[number]}.csv").write_text("a,b\n1,2\n")
     with inspect_recording(tmp_path) as recording:
@@ -793,7 +793,7 @@ def test_a_long_list_of_unused_files_is_cut(tmp_path):
 
 
 def test_a_missing_radar_is_explained_by_the_file_that_could_not_be_used(tmp_path):
-    picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
+    image(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     (tmp_path / "radar.csv").write_text("time_ns,links,rechts\n1,2,3\n")
     with pytest.raises(RecordingError) as caught:
         open_recording(tmp_path)
@@ -801,9 +801,9 @@ def test_a_missing_radar_is_explained_by_the_file_that_could_not_be_used(tmp_pat
     assert "radar.csv (no position columns" in str(caught.value)
 
 
-def test_a_radar_table_beside_the_pictures_is_found(tmp_path):
+def test_a_radar_table_beside_the_images_is_found(tmp_path):
     for number in range(2):
-        picture(tmp_path / f"{START_NS + number * NS_PER_S}.png", (8, 8))
+        image(tmp_path / f"{START_NS + number * NS_PER_S}.png", (8, 8))
     (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
     with open_recording(tmp_path) as recording:
         assert recording.radar_topic == "/radar/radar"

@@ -206,7 +206,7 @@ def test_files_of_other_kinds_open_as_before(tmp_path, jpeg):
         opened(folder, START)
 
 
-def test_a_stream_is_opened_with_the_pictures_of_its_camera(tmp_path):
+def test_a_stream_is_opened_with_the_images_of_its_camera(tmp_path):
     path = written(tmp_path, stream(scans(20, np.random.default_rng(13))))
     folder = tmp_path / "front"
     folder.mkdir()
@@ -219,7 +219,7 @@ def test_a_stream_is_opened_with_the_pictures_of_its_camera(tmp_path):
 
 
 @pytest.mark.parametrize("inner", ["", "radar/raw"])
-def test_a_folder_with_a_stream_and_pictures_below_is_read_whole(tmp_path, jpeg, inner):
+def test_a_folder_with_a_stream_and_images_below_is_read_whole(tmp_path, jpeg, inner):
     (tmp_path / inner).mkdir(parents=True, exist_ok=True)
     written(tmp_path / inner, stream(scans(20, np.random.default_rng(14))))
     (tmp_path / "notes").mkdir()

@@ -153,7 +153,7 @@ def test_an_island_begins_with_the_reflector_already_there_if_it_is_shorter_than
     assert all(window.times_ns[-1] - window.times_ns[0] < 15.5 * NS_PER_S for window in first)
 
 
-def test_several_reflectors_carts_and_passers_by_are_in_the_picture():
+def test_several_reflectors_carts_and_passers_by_are_in_the_image():
     options = replace(
         QUIET, reflectors=2, width_px=320, height_px=200, surroundings=Surroundings(companion=True, passers_by=1)
     )

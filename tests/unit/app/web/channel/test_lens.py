@@ -18,7 +18,7 @@ from calib_core.intrinsics import (
     BoardCorners,
     BoardSearch,
     CalibratedLens,
-    LeftOutPicture,
+    LeftOutImage,
     LensView,
     ModelTrial,
     SearchProgress,
@@ -53,7 +53,7 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 
 @pytest.fixture
 def found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def calibrate(pictures: object, board: Board, options: object, *, progress: Any, **_: object) -> Any:
+    def calibrate(images: object, board: Board, options: object, *, progress: Any, **_: object) -> Any:
         progress(SearchProgress(4, 4))
         lens = CalibratedLens(FOUND, board, board.corners_m, (), (), 0.1, 0.12)
         return BoardSearch(board, (640, 480), (), (), 4), lens
@@ -154,7 +154,7 @@ LENS = CalibratedLens(
     BOARD,
     BOARD.corners_m,
     tuple(lens_view(index, rms_px) for index, rms_px in ((3, 0.1), (7, 0.4), (9, 0.2))),
-    (LeftOutPicture(5, "frame 6", "blurred"),),
+    (LeftOutImage(5, "frame 6", "blurred"),),
     0.25,
     float("nan"),
     (ModelTrial("pinhole", 0.25, 0.26), ModelTrial("plumb_bob", 0.25, 0.27, 0.01, 0.002)),

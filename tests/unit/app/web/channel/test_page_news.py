@@ -152,7 +152,7 @@ def test_the_scan_of_a_frame_is_the_nearest_one_and_none_when_none_is_near():
     assert sight.scan_at(TimeNs(int(60e9))) is None
 
 
-def test_without_a_calibration_nothing_is_projected_into_the_picture():
+def test_without_a_calibration_nothing_is_projected_into_the_image():
     overlay = overlay_of(3, Session(), scan(0, [[5, 0, 0]]), ())
     assert overlay.returns is None
     assert overlay.guesses == ()

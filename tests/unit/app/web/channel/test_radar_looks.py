@@ -1,4 +1,4 @@
-"""A recording without pictures: what the whole radar recording says, and what is shown at one moment."""
+"""A recording without images: what the whole radar recording says, and what is shown at one moment."""
 
 import numpy as np
 import pytest

@@ -23,7 +23,7 @@ _LOOK = replace(
 _MOMENTS = np.array([1_000_000_000, 1_100_000_000])
 
 
-class _OnePicture:
+class _OneImage:
     """A recording whose frames all show the same reflector."""
 
     def image_bytes(self, index: int) -> EncodedImage:
@@ -34,7 +34,7 @@ class _OnePicture:
 def _ask(time: int, pixel_px: tuple[float, float]) -> Snapped:
     async def ask() -> Snapped:
         with ThreadPoolExecutor(1) as executor:
-            store = FrameStore(_OnePicture(), 2, executor)
+            store = FrameStore(_OneImage(), 2, executor)
             return await snapped(SnapWanted(TimeNs(time), pixel_px, "click-1"), _MOMENTS, store, executor)
 
     return asyncio.run(ask())

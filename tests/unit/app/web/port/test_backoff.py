@@ -9,7 +9,7 @@ import pytest
 from cocalib.web.port import entrance as module
 from cocalib.web.port.entrance import Backoff
 from cocalib.web.port.server import RunningServer
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 from tests.port_client import come_in, get
 from tests.serving import serving
 
@@ -59,7 +59,7 @@ def test_tries_take_turns_and_only_so_many_wait():
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[RunningServer]:
-    recording = PictureRecording(grey_pictures(1))
+    recording = ImageRecording(grey_images(1))
     with serving(recording, tmp_path / "s", name="one grey", token=TOKEN) as (running, _):
         yield running
 

@@ -20,17 +20,17 @@ from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.results import Calibration
 from cocalib.session import Session
 from cocalib.web.port.routes import Reply, Routes
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 
 CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index in range(5))
 
 
 @pytest.fixture
 def ask(project_root: Path) -> Callable[..., Reply]:
-    def answer(session: Session, address: str, recording: PictureRecording | None = None) -> Reply:
+    def answer(session: Session, address: str, recording: ImageRecording | None = None) -> Reply:
         workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
         routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
-        routes.admit(workspace, recording or PictureRecording(grey_pictures(1)), hub)
+        routes.admit(workspace, recording or ImageRecording(grey_images(1)), hub)
         return asyncio.run(routes.answer(address))
 
     return answer
@@ -115,8 +115,8 @@ def test_a_refused_field_is_named_and_a_name_in_the_address_is_written(file, ask
     assert json.loads(ask(Session(), "/api/preview/tf2").body)["field"] is None
 
 
-def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, ask):
-    recording = PictureRecording([np.full((60, 80, 3), shade, dtype=np.uint8) for shade in (10, 90, 200)])
+def test_the_image_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, ask):
+    recording = ImageRecording([np.full((60, 80, 3), shade, dtype=np.uint8) for shade in (10, 90, 200)])
     nearest = pair_of_check_point(file.calibration)
 
     def ask_at(stamp: int) -> Reply:
@@ -125,7 +125,7 @@ def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(fil
             for pair in file.calibration.pairs
         )
         session = Session(CLICKS, outcome=dataclasses.replace(file.calibration, pairs=pairs), outcome_revision=0)
-        return ask(session, f"/api/check_point_picture?{nearest}", recording)
+        return ask(session, f"/api/check_point_image?{nearest}", recording)
 
     for index, stamp in enumerate(recording.image_times.tolist()):
         shown = ask_at(stamp)

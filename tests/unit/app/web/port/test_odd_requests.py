@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.websockets_hook import read_head
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 from tests.port_client import come_in
 from tests.serving import serving
 
@@ -98,7 +98,7 @@ ODD = {
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-    recording = PictureRecording(grey_pictures(1))
+    recording = ImageRecording(grey_images(1))
     with serving(recording, tmp_path_factory.mktemp("s") / "s", name="one grey") as (running, _):
         yield running
     patch.undo()

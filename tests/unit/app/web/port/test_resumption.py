@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 import pytest
 
 from cocalib.web.port.resumption import Resumption, Ticket
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 from tests.port_client import come_in, get
 from tests.serving import serving
 
@@ -81,7 +81,7 @@ def test_a_key_file_that_others_may_know_is_not_used(state, kind):
 
 
 def test_a_page_comes_back_after_a_restart_but_its_cookie_alone_does_not(tmp_path):
-    recording, folder = PictureRecording(grey_pictures(1)), tmp_path / "s"
+    recording, folder = ImageRecording(grey_images(1)), tmp_path / "s"
     with serving(recording, folder, session="a") as (first, _):
         cookie, port = come_in(first), first.port
         assert get(first, "/api/ticket").status == 401

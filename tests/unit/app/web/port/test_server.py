@@ -17,8 +17,8 @@ from cocalib.web.port.entrance import MAX_SOCKETS
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
+from tests.image_recording import START, ImageRecording, grey_images
 from tests.page_view import PageView
-from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
 from tests.serving import serving
 
@@ -27,7 +27,7 @@ from tests.serving import serving
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-    recording = PictureRecording(grey_pictures(5))
+    recording = ImageRecording(grey_images(5))
     folder = tmp_path_factory.mktemp("session") / "s"
     with serving(recording, folder, camera=recording.camera(), name="five greys") as (running, _):
         yield running
@@ -264,7 +264,7 @@ def test_half_a_character_is_refused_and_the_channel_stays_open(server, cookie, 
 
 
 def test_after_closing_no_connection_is_accepted(tmp_path, state):
-    recording = PictureRecording(grey_pictures(1))
+    recording = ImageRecording(grey_images(1))
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
     running = start(workspace, recording, ServerOptions(port=0, token="mine"))
     assert running.url.endswith("?token=mine")

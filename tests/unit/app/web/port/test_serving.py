@@ -26,11 +26,11 @@ from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service
 from cocalib.workspace import Workspace, open_workspace
-from tests.picture_recording import START, PictureRecording, grey_pictures
+from tests.image_recording import START, ImageRecording, grey_images
 from tests.port_client import channel, come_in, get, wanted
 
 OPENING = Opening("long.bag", "Opening long.bag")
-RECORDING = PictureRecording(grey_pictures(3))
+RECORDING = ImageRecording(grey_images(3))
 LONG_S = 60.0
 POSIX_SIGNALS = pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process needs POSIX")
 
@@ -42,8 +42,8 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
     opened.close()
 
 
-def service(first_picture: Callable[[], Any] = lambda: None, *, let_in_after_s: float = 0.0) -> Service:
-    return Service(ServerOptions(port=0, no_browser=True), OPENING, first_picture, let_in_after_s=let_in_after_s)
+def service(first_image: Callable[[], Any] = lambda: None, *, let_in_after_s: float = 0.0) -> Service:
+    return Service(ServerOptions(port=0, no_browser=True), OPENING, first_image, let_in_after_s=let_in_after_s)
 
 
 def early(opening: Service) -> RunningServer:
@@ -53,15 +53,15 @@ def early(opening: Service) -> RunningServer:
     return server
 
 
-def picture(socket: ClientConnection) -> tuple[Any, bytes]:
-    """Read until a picture arrives; return its header and its bytes."""
+def image(socket: ClientConnection) -> tuple[Any, bytes]:
+    """Read until an image arrives; return its header and its bytes."""
     while not isinstance(message := socket.recv(timeout=20), bytes):
         pass
     length = int.from_bytes(message[:4], "little")
     return json.loads(message[4 : 4 + length]), message[4 + length :]
 
 
-def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_recording_is_open(workspace, capsys):
+def test_a_page_that_waits_sees_the_first_image_and_is_greeted_once_the_recording_is_open(workspace, capsys):
     with service(lambda: RECORDING.image_bytes(0)) as opening:
         server = early(opening)
         assert capsys.readouterr().out.splitlines() == ["Opening long.bag", f"Open {server.url}"]
@@ -73,7 +73,7 @@ def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_record
                 socket.send('{"type":"hello"}')
                 message = wanted(socket, "opening")
                 assert (message["name"], message["doing"], message["problem"]) == ("long.bag", "Opening long.bag", "")
-                header, data = picture(socket)
+                header, data = image(socket)
                 assert (header["index"], header["request"], header["width_px"]) == (-1, 0, 320)
                 assert data == RECORDING.image_bytes(0).data
             server.admit(workspace, RECORDING)
@@ -150,7 +150,7 @@ def test_an_end_while_opening_reaches_the_page_and_the_caller(error):
     assert serving._problem_text(OSError(5, "Input/output error")).endswith("see the terminal for the reason.")
 
 
-def test_a_first_picture_that_cannot_be_read_does_no_harm(workspace, caplog):
+def test_a_first_image_that_cannot_be_read_does_no_harm(workspace, caplog):
     def broken() -> Any:
         raise ZeroDivisionError("odd")
 

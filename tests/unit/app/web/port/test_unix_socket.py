@@ -11,7 +11,7 @@ import pytest
 from cocalib.cli import run
 from cocalib.web.port.address import AddressError
 from cocalib.web.port.link import forwarding_command, listening_socket, remove_socket
-from tests.picture_recording import PictureRecording, grey_pictures
+from tests.image_recording import ImageRecording, grey_images
 from tests.serving import serving
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no Unix sockets")
@@ -47,7 +47,7 @@ def got(path: Path, target: str, **headers: str) -> http.client.HTTPResponse:
 
 def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private, tmp_path):
     path = private / "s"
-    recording = PictureRecording(grey_pictures(1))
+    recording = ImageRecording(grey_images(1))
     with serving(recording, tmp_path / "session", name="one grey", port=9999, socket=path) as (running, _):
         assert path.stat().st_mode & 0o077 == 0
         assert running.url.startswith("http://127.0.0.1:9999/?token=")

@@ -138,7 +138,7 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
     points, none = np.array([[4.0, 0.0, 0.0], [9.0, 1.0, 0.2]]), np.full(2, np.nan)
     scan = RadarScan(TimeNs(0), points, np.array([0.0, 1.5]), none, np.full((2, 3), np.nan))
     returns = Returns.of_scan(scan, session.options.gating, lambda reported: reported)
-    picture = Frame(FrameHeader(index, 0, 640, 480, 1.0, "jpeg"), b"jpeg")
+    image = Frame(FrameHeader(index, 0, 640, 480, 1.0, "jpeg"), b"jpeg")
     return Sight(
         number=index + 1,
         index=index,
@@ -148,14 +148,14 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
         returns=returns,
         trail_s=0.0,
         window=returns.rows(np.array([0])),
-        picture=picture,
+        image=image,
         camera=CAMERA,
-        has_pictures=True,
+        has_images=True,
         colouring=coloured(),
     )
 
 
-def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_picture(drawn):
+def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_image(drawn):
     drawn.scene.show(sight())
     frustum = drawn.node("/camera")
     assert frustum.position == pytest.approx([0, 0, 0])

@@ -1,4 +1,4 @@
-"""Open what pictures of a board are given in: a recording, a video, a folder of pictures or several picture files."""
+"""Open what images of a board are given in: a recording, a video, a folder of images or several image files."""
 
 import glob
 import hashlib
@@ -17,8 +17,8 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import Recording, RecordingOptions, holds_recording, open_recording, require_files
 from cocalib.platform.files import keep
 
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
-_PICTURE_HEAD_BYTES = 1 << 16
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
+_IMAGE_HEAD_BYTES = 1 << 16
 _LEAST_OF_A_SERIES = 3
 _NUMBER = re.compile(r"\d+")
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mjpeg", ".ts")
@@ -27,8 +27,8 @@ _FARTHEST = 240
 _VIDEO_HEAD_BYTES = 1 << 20
 
 
-class FilePictures:
-    """Picture files, by number."""
+class FileImages:
+    """Image files, by number."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = tuple(paths)
@@ -49,7 +49,7 @@ class FilePictures:
         """Return None: files say nothing about time that can be relied on."""
         del index
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         """Return a file's pixels: uint8 (h, w, 3), blue first, as stored and not turned.
 
         Raises:
@@ -66,7 +66,7 @@ class FilePictures:
         except cv2.error as error:
             raise InputError(f"{path}: cannot be decoded; it is damaged or too large") from error
         if found is None:
-            raise InputError(f"{path}: not a picture that can be decoded; leave it out or copy it again")
+            raise InputError(f"{path}: not an image that can be decoded; leave it out or copy it again")
         return np.asarray(found)
 
     def digest(self) -> str:
@@ -74,15 +74,15 @@ class FilePictures:
         digest = hashlib.sha256()
         for path in self.paths:
             with path.open("rb") as file:
-                head = file.read(_PICTURE_HEAD_BYTES)
+                head = file.read(_IMAGE_HEAD_BYTES)
             digest.update(f"{name_text(path.name)}\0{path.stat().st_size}\0".encode())
             digest.update(head)
         return digest.hexdigest()
 
 
-def pictures_in(folder: Path) -> tuple[Path, ...]:
-    """Return the picture files directly in a folder, numbered ones in the order of their numbers."""
-    found = [path for path in folder.iterdir() if path.suffix.lower() in PICTURE_SUFFIXES and path.is_file()]
+def images_in(folder: Path) -> tuple[Path, ...]:
+    """Return the image files directly in a folder, numbered ones in the order of their numbers."""
+    found = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
     return tuple(sorted(found, key=_natural))
 
 
@@ -97,7 +97,7 @@ def series_of(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
 
 
 def refuse_two_series(folder: Path, paths: Sequence[Path]) -> None:
-    """Refuse a folder in which pictures of several cameras seem to be.
+    """Refuse a folder in which images of several cameras seem to be.
 
     Raises:
         InputError: the names form several series.
@@ -106,8 +106,8 @@ def refuse_two_series(folder: Path, paths: Sequence[Path]) -> None:
     if len(series) > 1:
         named = ", ".join(f"{name} ({len(found)})" for name, found in series.items())
         raise InputError(
-            f"{folder}: its pictures form {len(series)} series, perhaps of {len(series)} cameras: {named}; a calibration is of "
-            f"one camera: give its pictures, such as {folder / next(iter(series))}, or all of them by name if they are of one"
+            f"{folder}: its images form {len(series)} series, perhaps of {len(series)} cameras: {named}; a calibration is of "
+            f"one camera: give its images, such as {folder / next(iter(series))}, or all of them by name if they are of one"
         )
 
 
@@ -117,7 +117,7 @@ def _natural(path: Path) -> tuple[tuple[int, str, int], ...]:
     return tuple((1, "", int(part)) if part.isdecimal() else (0, part, 0) for part in parts)
 
 
-class RecordedPictures:
+class RecordedImages:
     """The frames of a recording's camera, by number."""
 
     def __init__(self, recording: Recording) -> None:
@@ -135,7 +135,7 @@ class RecordedPictures:
         """Return a frame's stamp."""
         return TimeNs(int(self._recording.image_times[index]))
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         """Return a frame's pixels: uint8 (h, w, 3), blue first.
 
         Raises:
@@ -153,7 +153,7 @@ class RecordedPictures:
         return digest.hexdigest()
 
 
-class VideoPictures:
+class VideoImages:
     """The frames of a video, decoded one after the other; several threads may ask for neighbours."""
 
     def __init__(self, path: Path) -> None:
@@ -188,7 +188,7 @@ class VideoPictures:
         """Return the time since the beginning of the video."""
         return TimeNs(round(self._times_ms[index] * 1e6))
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         """Return a frame's pixels: uint8 (h, w, 3), blue first.
 
         Raises:
@@ -229,40 +229,40 @@ class VideoPictures:
             self._capture.release()
 
 
-OpenPictures = RecordedPictures | VideoPictures | FilePictures
+OpenImages = RecordedImages | VideoImages | FileImages
 
 
 @contextmanager
-def open_pictures(paths: Sequence[Path], options: RecordingOptions | None = None) -> Iterator[OpenPictures]:
-    """Open a source of pictures of one camera; one picture at a time is read.
+def open_images(paths: Sequence[Path], options: RecordingOptions | None = None) -> Iterator[OpenImages]:
+    """Open a source of images of one camera; one image at a time is read.
 
     Args:
-        paths: a recording's files, one video, one folder of pictures, or several pictures; "*" in a name is spelled out.
+        paths: a recording's files, one video, one folder of images, or several images; "*" in a name is spelled out.
         options: topics and clock of a recording.
 
     Raises:
-        CalibrationError: there are no pictures, or those of several sources or cameras.
+        CalibrationError: there are no images, or those of several sources or cameras.
     """
     found = require_files(spelled_out(paths))
     kinds = {_kind(path) for path in found}
     if len(kinds) > 1:
         named = ", ".join(f"{path.name}: {_kind(path)}" for path in (found[0], _first_of_another_kind(found)))
         raise InputError(
-            f"{len(found)} sources of different kinds ({named}); give either a recording, one video, one folder of pictures, or "
-            "picture files"
+            f"{len(found)} sources of different kinds ({named}); give either a recording, one video, one folder of images, or "
+            "image files"
         )
     (kind,) = kinds
     if kind == "a recording":
         with open_recording(found, options, require=("image",)) as recording:
             keep(recording.files)
-            yield RecordedPictures(recording)
+            yield RecordedImages(recording)
         return
     if options is not None and options.image_topic is not None:
         raise InputError(f"{found[0].name} is {kind}; --image-topic {options.image_topic} applies to a recording")
     if kind == "a video":
         if len(found) > 1:
             raise InputError(f"{len(found)} videos; a calibration is of one camera in one video: give one of them")
-        video = VideoPictures(found[0])
+        video = VideoImages(found[0])
         try:
             yield video
         finally:
@@ -270,7 +270,7 @@ def open_pictures(paths: Sequence[Path], options: RecordingOptions | None = None
         return
     files = _files(found, kind)
     keep(files)
-    yield FilePictures(files)
+    yield FileImages(files)
 
 
 def spelled_out(paths: Sequence[Path]) -> tuple[Path, ...]:
@@ -292,16 +292,16 @@ def spelled_out(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 
 def _files(paths: Sequence[Path], kind: str) -> tuple[Path, ...]:
-    """Return the picture files that are meant.
+    """Return the image files that are meant.
 
     Raises:
-        InputError: there are several folders, or pictures of several cameras in one.
+        InputError: there are several folders, or images of several cameras in one.
     """
-    if kind == "a picture":
+    if kind == "an image":
         return tuple(dict.fromkeys(paths))
     if len(paths) > 1:
-        raise InputError(f"{len(paths)} folders of pictures; a calibration is of one camera: give one folder")
-    files = pictures_in(paths[0])
+        raise InputError(f"{len(paths)} folders of images; a calibration is of one camera: give one folder")
+    files = images_in(paths[0])
     refuse_two_series(paths[0], files)
     return files
 
@@ -309,9 +309,9 @@ def _files(paths: Sequence[Path], kind: str) -> tuple[Path, ...]:
 def _kind(path: Path) -> str:
     suffix = path.suffix.lower()
     if path.is_dir():
-        return "a folder of pictures" if pictures_in(path) and not holds_recording(path) else "a recording"
-    if suffix in PICTURE_SUFFIXES:
-        return "a picture"
+        return "a folder of images" if images_in(path) and not holds_recording(path) else "a recording"
+    if suffix in IMAGE_SUFFIXES:
+        return "an image"
     return "a video" if suffix in VIDEO_SUFFIXES else "a recording"
 
 

@@ -1,6 +1,6 @@
 /**
- * The picture without the lens's distortion, to judge the intrinsics by straight edges: a grid, and lines that the person drags along
- * them. Marks belong to the picture as taken, so meanwhile they are hidden and nothing can be marked.
+ * The image without the lens's distortion, to judge the intrinsics by straight edges: a grid, and lines that the person drags along
+ * them. Marks belong to the image as taken, so meanwhile they are hidden and nothing can be marked.
  */
 
 import { ink } from "../base/colours.js";
@@ -10,7 +10,7 @@ import { emit, on, state } from "../base/state.js";
 import { requestAgain } from "../time/player.js";
 import { toDevice, toImage, viewport } from "./geometry.js";
 
-/** A line along an edge [px of the rectified picture]. @typedef {{from: [number, number], to: [number, number]}} Ruler */
+/** A line along an edge [px of the rectified image]. @typedef {{from: [number, number], to: [number, number]}} Ruler */
 const COLUMNS = 12;
 /** More lines than these would hide what they are laid along. */
 const MOST = 6;
@@ -36,10 +36,10 @@ export function startRectified() {
   });
 }
 
-/** Why the picture cannot be rectified now; "" if it can. */
+/** Why the image cannot be rectified now; "" if it can. */
 export const withoutRectified = () => (state.lens?.intrinsics ? "" : "There are no intrinsics to rectify with: calibrate the lens in the menu under Lens");
 
-/** Show the picture rectified, or as taken. */
+/** Show the image rectified, or as taken. */
 export function toggleRectified() {
   const why = withoutRectified();
   if (why && !state.rectified) return toast(`${why}.`);
@@ -57,10 +57,10 @@ function setRectified(on) {
   requestAgain();
 }
 
-/** Whether marks are refused because the picture is rectified; then this says so. */
+/** Whether marks are refused because the image is rectified; then this says so. */
 export function refusesMarks() {
   if (!state.rectified) return false;
-  toast("The picture is rectified: marks are set in the picture as taken.", "Press U to show it.");
+  toast("The image is rectified: marks are set in the image as taken.", "Press U to show it.");
   return true;
 }
 

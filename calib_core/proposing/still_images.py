@@ -1,7 +1,7 @@
-"""Still pictures: what the camera saw during a stretch of a dwell, without whoever walked past.
+"""Still images: what the camera saw during a stretch of a dwell, without whoever walked past.
 
-While two reflectors are moved in turn, their dwells overlap; a dwell then has a still picture for every set of placements
-that stood together, so that what changed can be told apart. Pictures are brought to one light before they are compared.
+While two reflectors are moved in turn, their dwells overlap; a dwell then has a still image for every set of placements
+that stood together, so that what changed can be told apart. Images are brought to one light before they are compared.
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ class FrameSource(Protocol):
 
 
 _FRAMES = 7
-"""Pictures whose median shows a dwell without whoever walks past."""
+"""Images whose median shows a dwell without whoever walks past."""
 _AT_ENDS_S = 0.6
 """Left out at the ends of a dwell, where hands are still at the reflector."""
 _WORKING_WIDTH_PX = 960
@@ -47,16 +47,16 @@ _LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StillPicture:
+class StillImage:
     """The median of frames during which the same placements stood.
 
     Attributes:
-        picture: (h, w, 3) uint8, reduced.
+        image: (h, w, 3) uint8, reduced.
         standing: numbers of the placements that stood.
         time: stamp in the middle of its frames.
     """
 
-    picture: np.ndarray
+    image: np.ndarray
     standing: frozenset[int]
     time: TimeNs
 
@@ -67,22 +67,22 @@ class SeenFrames:
 
     Attributes:
         numbers: (k,) of the frames that could be read.
-        pictures: of each (h, w, 3) uint8.
-        factor: width of the full picture over that of these.
+        images: of each (h, w, 3) uint8.
+        factor: width of the full image over that of these.
     """
 
     numbers: Indices
-    pictures: tuple[np.ndarray, ...]
+    images: tuple[np.ndarray, ...]
     factor: float
 
-    def clearest(self, picture: np.ndarray) -> Indices:
-        """Return the numbers of the few frames that differ least from a picture, ascending.
+    def clearest(self, image: np.ndarray) -> Indices:
+        """Return the numbers of the few frames that differ least from an image, ascending.
 
         Args:
-            picture: (h, w, 3) uint8, their median.
+            image: (h, w, 3) uint8, their median.
         """
-        usual = picture[::_EVERY, ::_EVERY].astype(np.int16)
-        off = [float(np.abs(one[::_EVERY, ::_EVERY] - usual).mean()) for one in self.pictures]
+        usual = image[::_EVERY, ::_EVERY].astype(np.int16)
+        off = [float(np.abs(one[::_EVERY, ::_EVERY] - usual).mean()) for one in self.images]
         return np.sort(self.numbers[np.argsort(off, kind="stable")[:_CLEAR_FRAMES]])
 
 
@@ -108,7 +108,7 @@ def seen_frames(numbers: Indices, frames: FrameSource) -> SeenFrames:
     """
     import cv2
 
-    read, pictures, factor = [], [], 1.0
+    read, images, factor = [], [], 1.0
     for number in numbers.tolist():
         try:
             full = frames.image(number)
@@ -117,18 +117,18 @@ def seen_frames(numbers: Indices, frames: FrameSource) -> SeenFrames:
         factor = max(1.0, full.shape[1] / _WORKING_WIDTH_PX)
         size = (round(full.shape[1] / factor), round(full.shape[0] / factor))
         read.append(number)
-        pictures.append(cv2.resize(full, size, interpolation=cv2.INTER_AREA) if factor > 1.0 else full)
-    middle = pictures[len(pictures) // 2] if pictures else None
+        images.append(cv2.resize(full, size, interpolation=cv2.INTER_AREA) if factor > 1.0 else full)
+    middle = images[len(images) // 2] if images else None
     return SeenFrames(
         np.array(read, dtype=np.int64),
-        tuple(in_light_of(middle, picture) for picture in pictures if middle is not None),
+        tuple(in_light_of(middle, image) for image in images if middle is not None),
         factor,
     )
 
 
-def still_pictures(
+def still_images(
     number: int, placements: Sequence[Placement], seen: SeenFrames, image_times: TimesNs
-) -> tuple[StillPicture, ...]:
+) -> tuple[StillImage, ...]:
     """Take the median of the frames of a dwell, for each set of placements that stood together.
 
     Args:
@@ -143,8 +143,8 @@ def still_pictures(
         groups.setdefault(standing | {number}, []).append(k)
     least = min(_LEAST_FRAMES, max(map(len, groups.values()), default=0))
     return tuple(
-        StillPicture(
-            stack_median([seen.pictures[k] for k in rows]),
+        StillImage(
+            stack_median([seen.images[k] for k in rows]),
             standing,
             TimeNs(int(image_times[seen.numbers[rows[len(rows) // 2]]])),
         )
@@ -153,15 +153,15 @@ def still_pictures(
     )
 
 
-def stack_median(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the median of pictures of one shape and type; of an even number the mean of both middle ones.
+def stack_median(images: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the median of images of one shape and type; of an even number the mean of both middle ones.
 
     Args:
-        pictures: at least one; uint8, uint16 or float32.
+        images: at least one; uint8, uint16 or float32.
     """
     import cv2
 
-    stack = list(pictures)
+    stack = list(images)
     for low, high in _exchanges(len(stack)):
         stack[low], stack[high] = cv2.min(stack[low], stack[high]), cv2.max(stack[low], stack[high])
     middle = len(stack) // 2
@@ -193,21 +193,21 @@ _EVERY_PIXEL = 6
 """A gain is fitted to one row and column in so many."""
 _DARK_GREY, _BRIGHT_GREY = 12, 243
 _SHADE_SHARE = 0.16
-"""Side of the square over which the light is compared, of the picture's width: what is smaller is not a change of light."""
+"""Side of the square over which the light is compared, of the image's width: what is smaller is not a change of light."""
 _REDUCED = 8
 _SAME_LIGHT = 0.015
 _LEAST_SHADE, _MOST_SHADE = 0.7, 1.4
 
 
-def channel_gains(picture: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return by how much to multiply each channel of a reference so that most of it looks like a picture: (3,).
+def channel_gains(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return by how much to multiply each channel of a reference so that most of it looks like an image: (3,).
 
     Args:
-        picture: (h, w, 3) uint8.
+        image: (h, w, 3) uint8.
         reference: (h, w, 3) uint8.
     """
     one, other = (
-        each[_EVERY_PIXEL // 2 :: _EVERY_PIXEL, _EVERY_PIXEL // 2 :: _EVERY_PIXEL] for each in (picture, reference)
+        each[_EVERY_PIXEL // 2 :: _EVERY_PIXEL, _EVERY_PIXEL // 2 :: _EVERY_PIXEL] for each in (image, reference)
     )
     gains = np.ones(3)
     for channel in range(3):
@@ -218,49 +218,49 @@ def channel_gains(picture: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return gains
 
 
-def in_same_light(picture: np.ndarray, gains: np.ndarray, *, levels_per_grey: float) -> np.ndarray:
-    """Return a picture with its channels multiplied: (h, w, 3) uint16, so many levels per level of grey.
+def in_same_light(image: np.ndarray, gains: np.ndarray, *, levels_per_grey: float) -> np.ndarray:
+    """Return an image with its channels multiplied: (h, w, 3) uint16, so many levels per level of grey.
 
     Args:
-        picture: (h, w, 3) uint8.
+        image: (h, w, 3) uint8.
         gains: (3,) of its channels.
         levels_per_grey: how fine.
     """
     import cv2
 
     factors = np.array([*(levels_per_grey * gains), 0.0])
-    return np.asarray(cv2.multiply(picture, factors, dtype=cv2.CV_16U))
+    return np.asarray(cv2.multiply(image, factors, dtype=cv2.CV_16U))
 
 
-def in_light_of(reference: np.ndarray, picture: np.ndarray) -> np.ndarray:
-    """Return a picture in the light of another one: (h, w, 3) uint8; the picture itself if that hardly differs.
+def in_light_of(reference: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Return an image in the light of another one: (h, w, 3) uint8; the image itself if that hardly differs.
 
     Args:
         reference: (h, w, 3) uint8.
-        picture: (h, w, 3) uint8.
+        image: (h, w, 3) uint8.
     """
     import cv2
 
-    gains = channel_gains(reference, picture)
-    if picture is reference or np.abs(gains - 1.0).max() < _SAME_LIGHT:
-        return picture
-    return np.asarray(cv2.convertScaleAbs(in_same_light(picture, gains, levels_per_grey=64.0), alpha=1.0 / 64.0))
+    gains = channel_gains(reference, image)
+    if image is reference or np.abs(gains - 1.0).max() < _SAME_LIGHT:
+        return image
+    return np.asarray(cv2.convertScaleAbs(in_same_light(image, gains, levels_per_grey=64.0), alpha=1.0 / 64.0))
 
 
-def local_light(picture: np.ndarray, usual: np.ndarray) -> np.ndarray:
+def local_light(image: np.ndarray, usual: np.ndarray) -> np.ndarray:
     """Return how much brighter the surroundings of each pixel are than usual: (h, w, 1) float32, about 1.
 
     Args:
-        picture: (h, w, 3) float32.
+        image: (h, w, 3) float32.
         usual: (h, w, 3) float32, with the gains of the channels applied.
     """
     import cv2
 
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     small = (max(1, width // _REDUCED), max(1, height // _REDUCED))
     one, other = (
         cv2.cvtColor(cv2.resize(each, small, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
-        for each in (picture, usual)
+        for each in (image, usual)
     )
     share = (np.clip((one + 4.0) / (other + 4.0), _LEAST_SHADE, _MOST_SHADE) - _LEAST_SHADE) / (
         _MOST_SHADE - _LEAST_SHADE

@@ -5,7 +5,7 @@ import { goTo, pause } from "../time/player.js";
 import { flushNudge } from "./clicking.js";
 import { expectedHere } from "./cross.js";
 import { lookAt, lookInto, viewport, zoom } from "./geometry.js";
-import { fit, redraw } from "./picture.js";
+import { fit, redraw } from "./image.js";
 
 /** The frame to centre once it is shown. @type {number|null} */
 let awaited = null;
@@ -15,7 +15,7 @@ export function startArriving() {
   on(["playing"], () => (awaited = null));
 }
 
-/** What is shown around an expected reflector is this part of the picture. */
+/** What is shown around an expected reflector is this part of the image. */
 const PART = 1 / 6;
 /** A view in which that part is at least so wide is close enough already. */
 const NEAR = 0.4;

@@ -1,4 +1,4 @@
-"""Read camera frames from a folder of pictures."""
+"""Read camera frames from a folder of images."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,9 +11,9 @@ from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.camera.jpeg import (
     JPEG_MAGIC,
     PNG_MAGIC,
+    image_fault,
+    image_size_px,
     is_cut_off,
-    picture_fault,
-    picture_size_px,
     png_fault,
 )
 from calib_core.recordings.plain_files.file_stamps import stamp_files
@@ -21,46 +21,46 @@ from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camer
 from calib_core.recordings.plain_files.source import (
     PlainOptions,
     PlainSource,
-    picture_channel,
-    picture_message,
+    image_channel,
+    image_message,
     topic_of,
 )
 
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _FRAME = "camera"
 _MAX_BYTES = 1 << 30
-_SAMPLED = 8  # pictures whose checksums are read; if one is wrong, those of all
+_SAMPLED = 8  # images whose checksums are read; if one is wrong, those of all
 
 
-def open_picture_folder(
+def open_image_folder(
     folder: Path, files: Sequence[Path], options: PlainOptions, known: PlainSource | None = None
 ) -> PlainSource:
-    """Open a folder of pictures; files that cannot be pictures are left out, with a warning.
+    """Open a folder of images; files that cannot be images are left out, with a warning.
 
     Args:
-        folder: of the pictures.
-        files: the pictures.
+        folder: of the images.
+        files: the images.
         options: the user's.
         known: another folder, whose files have times.
 
     Raises:
         RecordingError: the files have no times, or none can be read.
     """
-    faults = {file: fault for file in files if (fault := picture_fault(file))}
+    faults = {file: fault for file in files if (fault := image_fault(file))}
     if any(_checksum_fault(file) for file in files[:: max(len(files) // _SAMPLED, 1)] if file not in faults):
         faults |= {file: fault for file in files if file not in faults and (fault := _checksum_fault(file))}
     sound = [file for file in files if file not in faults]
     if not sound:
         file, fault = next(iter(faults.items()))
-        raise RecordingError(f"{folder}: none of its {len(files)} pictures can be read: {file.name} {fault}")
+        raise RecordingError(f"{folder}: none of its {len(files)} images can be read: {file.name} {fault}")
     stamped = stamp_files(folder, sound, options, known)
-    camera = camera_beside(folder, stamped.files, picture_size_px(stamped.files[0]))
+    camera = camera_beside(folder, stamped.files, image_size_px(stamped.files[0]))
 
     def message(row: int) -> bytes:
-        return picture_message(TimeNs(int(stamped.times_ns[row])), _FRAME, _picture(stamped.files[row]))
+        return image_message(TimeNs(int(stamped.times_ns[row])), _FRAME, _image(stamped.files[row]))
 
     text = f"folder of images, {len(stamped.files)} files{_calibration_words(camera)}"
-    source = stamped.source(folder, text, picture_channel(topic_of(folder, "image")), message)
+    source = stamped.source(folder, text, image_channel(topic_of(folder, "image")), message)
     warnings = (*_about_faults(folder, faults, len(files)), *_about_ends(folder, sound), *source.warnings)
     return replace(source, warnings=warnings, camera=camera, unreadable=faults)
 
@@ -77,7 +77,7 @@ def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple
     if not faults:
         return ()
     file, fault = next(iter(faults.items()))
-    what = f"{len(faults)} of {count} pictures in {folder.name} cannot be read and are skipped; the first: {file.name} {fault}"
+    what = f"{len(faults)} of {count} images in {folder.name} cannot be read and are skipped; the first: {file.name} {fault}"
     return (DataWarning.reported("unreadable-pictures", what, "copy them again from their source if they matter"),)
 
 
@@ -85,7 +85,7 @@ def _about_ends(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
     cut = [file.name for file in files if is_cut_off(file)]
     if not 0 < len(cut) <= len(files) / 2:  # some cameras never write the end
         return ()
-    what = f"{len(cut)} of {len(files)} pictures in {folder.name} are cut off, and grey below; the first: {cut[0]}"
+    what = f"{len(cut)} of {len(files)} images in {folder.name} are cut off, and grey below; the first: {cut[0]}"
     return (
         DataWarning.reported("unreadable-pictures", what, "copy them again from their source; click nothing in them"),
     )
@@ -97,11 +97,11 @@ def _calibration_words(camera: FolderCamera | None) -> str:
     return f"; intrinsics from {camera.file}" + (f"; {camera.pose}" if camera.pose else "")
 
 
-def _picture(path: Path) -> bytes:
-    """Return a JPEG or PNG unchanged, and any other picture losslessly as PNG."""
+def _image(path: Path) -> bytes:
+    """Return a JPEG or PNG unchanged, and any other image losslessly as PNG."""
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, which is too large for a picture")
+            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, which is too large for an image")
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; is it still there?") from error
@@ -115,5 +115,5 @@ def _picture(path: Path) -> bytes:
         else None
     )
     if pixels is None:
-        raise MessageError(f"{path.name} is not a readable picture (it begins with {data[:4].hex() or 'nothing'})")
+        raise MessageError(f"{path.name} is not a readable image (it begins with {data[:4].hex() or 'nothing'})")
     return bytes(cv2.imencode(".png", pixels)[1].tobytes())

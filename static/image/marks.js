@@ -161,7 +161,7 @@ function drawReprojection(pen, click, x, y, closeUp) {
 }
 
 /**
- * Stroke a path with a dark edge below it, so that it is visible on any picture.
+ * Stroke a path with a dark edge below it, so that it is visible on any image.
  * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
  */
 export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
@@ -201,7 +201,7 @@ function hollowCross(pen, x, y, arm, gap) {
 /** @typedef {keyof typeof state.layers} Layer */
 /** @type {[Layer, string, string][]} */
 const LAYERS = [
-  ["returns", "Returns", "Radar returns of the nearest scan, projected into the picture: dots are static, triangles are moving. (1)"],
+  ["returns", "Returns", "Radar returns of the nearest scan, projected into the image: dots are static, triangles are moving. (1)"],
   ["others", "All clicks", "Clicks in all other frames, coloured by residual. (2)"],
   ["ellipses", "95 %", "Ellipses around the reprojections that contain 95 % of the clicks of good pairs. (3)"],
   ["predictions", "Predicted", "Expected position of the reflector in this placement (circle) and best next placement (diamond). (4)"],
@@ -238,6 +238,6 @@ function drawChips() {
     if (layer !== "rectified") continue;
     const why = withoutRectified();
     chip.hidden = why !== "";
-    chip.dataset.hint = "The picture without the lens's distortion, with a grid: straight edges must be straight. Drag a line along one to compare. (U)";
+    chip.dataset.hint = "The image without the lens's distortion, with a grid: straight edges must be straight. Drag a line along one to compare. (U)";
   }
 }

@@ -11,13 +11,13 @@ import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../
 import { leaveLive } from "../time/player.js";
 import { clamped, leaveCross, moveTo, place } from "./clicking.js";
 import { lookInto, toDevice, viewport } from "./geometry.js";
-import { fit, redraw } from "./picture.js";
+import { fit, redraw } from "./image.js";
 
 /** @typedef {import("../base/state.js").Cross} Cross */
 
 /** Digits from the top left, as on the keyboard's row. */
 const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
-/** The first field around an expected position is this part of the picture. */
+/** The first field around an expected position is this part of the image. */
 const FIRST = 1 / 9;
 /** A field smaller than this is not divided further [px]. */
 const LEAST = 0.1;

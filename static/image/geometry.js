@@ -1,5 +1,5 @@
 /**
- * Maps image pixels to the screen and back. Image pixels follow OpenCV: (0, 0) is the centre of the top-left pixel, the picture's
+ * Maps image pixels to the screen and back. Image pixels follow OpenCV: (0, 0) is the centre of the top-left pixel, the image's
  * edge is at -0.5. The half pixel appears only in `toDevice` and its inverse.
  */
 
@@ -17,9 +17,9 @@ export const viewport = {
   /** Device px per CSS px. */ ratio: 1,
   /** Device px per px of a mark, which grows on a 4K monitor as the small text does. */ unit: 1,
   /** Device px per image px. */ scale: 1,
-  /** Device px of the picture's top-left edge. */ left: 0,
+  /** Device px of the image's top-left edge. */ left: 0,
   top: 0,
-  /** Whether the picture is fitted, and stays so when the box changes. */ fitted: true,
+  /** Whether the image is fitted, and stays so when the box changes. */ fitted: true,
   imageWidth: 1,
   imageHeight: 1,
 };
@@ -43,7 +43,7 @@ export function toCss(u, v) {
   return [x / viewport.ratio, y / viewport.ratio];
 }
 
-/** Whether an image point is on the picture. @param {number} u @param {number} v */
+/** Whether an image point is on the image. @param {number} u @param {number} v */
 export function onImage(u, v) {
   return u >= -0.5 && v >= -0.5 && u <= viewport.imageWidth - 0.5 && v <= viewport.imageHeight - 0.5;
 }
@@ -66,7 +66,7 @@ export function resize(width, height) {
   return true;
 }
 
-/** Show all of the picture. */
+/** Show all of the image. */
 export function fit() {
   const width = viewport.width * viewport.ratio;
   const height = viewport.height * viewport.ratio;
@@ -104,7 +104,7 @@ export function zoomAt(factor, x, y) {
   keepInside();
 }
 
-/** Move the picture. @param {number} dx @param {number} dy CSS px */
+/** Move the image. @param {number} dx @param {number} dy CSS px */
 export function pan(dx, dy) {
   if (viewport.fitted) return;
   viewport.left += dx * viewport.ratio;
@@ -122,7 +122,7 @@ function fitScale() {
   );
 }
 
-/** Keep the picture in the box: its edge may reach the middle, no farther. */
+/** Keep the image in the box: its edge may reach the middle, no farther. */
 function keepInside() {
   const [halfWidth, halfHeight] = [(viewport.width * viewport.ratio) / 2, (viewport.height * viewport.ratio) / 2];
   viewport.left = Math.min(halfWidth, Math.max(halfWidth - viewport.imageWidth * viewport.scale, viewport.left));

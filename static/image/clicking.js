@@ -1,5 +1,5 @@
 /**
- * Marks by pointer and keys: click to place, drag to move, arrow keys to nudge, S snaps to the reflector's apex that the picture shows
+ * Marks by pointer and keys: click to place, drag to move, arrow keys to nudge, S snaps to the reflector's apex that the image shows
  * within 15 px; a click on a candidate's number chooses it, a drag elsewhere pans, the wheel zooms at the cursor.
  */
 
@@ -11,7 +11,7 @@ import { leaveLive, pause } from "../time/player.js";
 import { candidateNear, choose } from "./candidates.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { hold } from "./loupe.js";
-import { marks, redraw, zoomBy } from "./picture.js";
+import { marks, redraw, zoomBy } from "./image.js";
 import { dragRuler, dropRuler, pressRuler, refusesMarks } from "./rectified.js";
 
 /** A press that moves farther than this is a drag [CSS px]. */
@@ -23,7 +23,7 @@ const REST = 250;
 
 /** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("../messages.js").ClickRow|null, candidate: number, pointer: number}|null} */
 let press = null;
-/** Whether it draws a line along an edge of the rectified picture. */
+/** Whether it draws a line along an edge of the rectified image. */
 let ruling = false;
 /** @type {{click: import("../messages.js").ClickRow, u: number, v: number, timer: number}|null} */
 let nudge = null;
@@ -192,7 +192,7 @@ export async function moveTo(click, u, v, { mark = "moved", sigma_px = null } = 
   await settle(click.id, { type: "click_moved", id: click.id, pixel_px: [inU, inV], mark, sigma_px });
 }
 
-/** Clamp a point to the picture. @param {number} u @param {number} v @returns {[number, number]} */
+/** Clamp a point to the image. @param {number} u @param {number} v @returns {[number, number]} */
 export function clamped(u, v) {
   const most = [viewport.imageWidth - 0.5, viewport.imageHeight - 0.5];
   return [Math.min(most[0], Math.max(-0.5, u)), Math.min(most[1], Math.max(-0.5, v))];

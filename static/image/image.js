@@ -9,10 +9,10 @@ import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, state } fr
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
-const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
-const picture = /** @type {HTMLCanvasElement} */ (document.getElementById("picture"));
+const pane = /** @type {HTMLElement} */ (document.getElementById("image-pane"));
+const image = /** @type {HTMLCanvasElement} */ (document.getElementById("image"));
 export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
-const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", { alpha: false }));
+const paper = /** @type {CanvasRenderingContext2D} */ (image.getContext("2d", { alpha: false }));
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
 /** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
 const SQUARES_FROM = 8;
@@ -20,14 +20,14 @@ const SQUARES_FROM = 8;
 const MARK_PX = 24;
 let paintFrame = false;
 let drawInk = false;
-const words = /** @type {HTMLElement} */ (document.getElementById("picture-words"));
-/** The picture is described once nothing has changed for this long [ms], so that a screen reader can finish. */
+const words = /** @type {HTMLElement} */ (document.getElementById("image-words"));
+/** The image is described once nothing has changed for this long [ms], so that a screen reader can finish. */
 const REST_MS = 500;
 /** @type {Record<string, string>} */
 const STATES = { inlier: "agrees with the others", outlier: "does not agree with the others", excluded: "excluded", unpaired: "no radar return belongs to it", pending: "not in the calibration yet" };
 let timer = 0;
 
-export function startPicture() {
+export function startImage() {
   new ResizeObserver(measure).observe(pane);
   watchRatio();
   on(["shown", "opening"], () => {
@@ -65,7 +65,7 @@ function watchRatio() {
 function measure() {
   const below = Number.parseFloat(getComputedStyle(pane).paddingBottom); // room for the line on the frame
   if (!geometry.resize(pane.clientWidth, pane.clientHeight - below)) return;
-  for (const canvas of [picture, marks]) {
+  for (const canvas of [image, marks]) {
     canvas.width = Math.round(viewport.width * viewport.ratio);
     canvas.height = Math.round(viewport.height * viewport.ratio);
     canvas.style.width = `${viewport.width}px`;
@@ -81,7 +81,7 @@ function dropPreview() {
   state.preview = null;
 }
 
-/** Take the size of the picture from the first frame. */
+/** Take the size of the image from the first frame. */
 function takeSize() {
   const shown = state.shown ?? state.preview;
   if (!shown || (shown.width === viewport.imageWidth && shown.height === viewport.imageHeight)) return;
@@ -104,16 +104,16 @@ function redrawMarks() {
 }
 
 function paint() {
-  if (paintFrame || !drawInk) paintPicture();
+  if (paintFrame || !drawInk) paintImage();
   paintFrame = drawInk = false;
   ink.setTransform(1, 0, 0, 1, 0, 0);
   ink.clearRect(0, 0, marks.width, marks.height);
   if (state.shown) drawLayers(ink);
 }
 
-function paintPicture() {
+function paintImage() {
   paper.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
-  paper.fillRect(0, 0, picture.width, picture.height);
+  paper.fillRect(0, 0, image.width, image.height);
   const shown = state.shown ?? state.preview;
   if (!shown) return;
   paper.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
@@ -122,7 +122,7 @@ function paintPicture() {
   paper.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);
 }
 
-/** Fit the picture into its box. */
+/** Fit the image into its box. */
 export function fit() {
   geometry.fit();
   redraw();
@@ -144,20 +144,20 @@ export function startDescribing() {
 }
 
 function drawWords() {
-  const text = state.looking ? lookWords() : pictureWords();
+  const text = state.looking ? lookWords() : imageWords();
   if (words.textContent !== text) words.textContent = text;
 }
 
 /** The frame, its placement and its marks, in sentences. */
-function pictureWords() {
+function imageWords() {
   const index = state.shown?.index;
   if (index === undefined) return "";
   const returns = state.overlay?.index === index ? (state.overlay.returns?.length ?? 0) : 0;
   const others = (state.view?.clicks ?? []).filter((click) => click.frame !== index).length;
-  return [moment(index), placementWords(index), ...markWords(index), plural(others, "mark in other frames", "marks in other frames"), plural(returns, "radar return in the picture", "radar returns in the picture")].filter(Boolean).join(". ") + ".";
+  return [moment(index), placementWords(index), ...markWords(index), plural(others, "mark in other frames", "marks in other frames"), plural(returns, "radar return in the image", "radar returns in the image")].filter(Boolean).join(". ") + ".";
 }
 
-/** The same for a recording without pictures. */
+/** The same for a recording without images. */
 function lookWords() {
   const returns = state.look?.index === state.cursor ? state.look : null;
   return returns ? `${[moment(state.cursor), placementWords(state.cursor)].filter(Boolean).join(". ")}.` : "";

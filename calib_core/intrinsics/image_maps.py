@@ -1,4 +1,4 @@
-"""Maps of a calibrated lens over the picture: residuals, and whether they are more than noise; how uncertain a projection is."""
+"""Maps of a calibrated lens over the image: residuals, and whether they are more than noise; how uncertain a projection is."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _CORRELATED = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualField:
-    """Residuals of all used corners, and their means over cells of the picture.
+    """Residuals of all used corners, and their means over cells of the image.
 
     Attributes:
         pixels_px: (n, 2) where the corners were found.
@@ -61,7 +61,7 @@ class ResidualField:
 
 
 def residual_field(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = _ROWS) -> ResidualField:
-    """Return the residuals over the picture.
+    """Return the residuals over the image.
 
     Args:
         lens: with its views.
@@ -138,8 +138,8 @@ _COLUMNS_OF_POINTS, _ROWS_OF_POINTS = 32, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PictureGrid:
-    """Standard deviations over the picture.
+class ImageGrid:
+    """Standard deviations over the image.
 
     Attributes:
         x_px: (c,) columns of the grid.
@@ -159,7 +159,7 @@ class PictureGrid:
 
 def projection_uncertainty(
     lens: CalibratedLens, columns: int = _COLUMNS_OF_POINTS, rows: int = _ROWS_OF_POINTS
-) -> PictureGrid:
+) -> ImageGrid:
     """Return how far the pixel of a fixed, far point is uncertain.
 
     Other intrinsics would have given the views other poses, so that a change of all pixels which a rotation of the camera
@@ -170,15 +170,15 @@ def projection_uncertainty(
         columns: of the grid.
         rows: of the grid.
     """
-    x_px, y_px, places = picture_grid(lens.camera, columns, rows)
+    x_px, y_px, places = image_grid(lens.camera, columns, rows)
     covariance = lens.camera.covariance
     matrix = np.zeros((len(lens.camera.parameters),) * 2) if covariance is None else covariance.matrix
     spread = grid_covariance(lens.camera, matrix, places, found_pixels(lens))
-    return PictureGrid(x_px, y_px, np.sqrt(np.maximum(larger_eigenvalues(spread), 0.0)).reshape(rows, columns))
+    return ImageGrid(x_px, y_px, np.sqrt(np.maximum(larger_eigenvalues(spread), 0.0)).reshape(rows, columns))
 
 
-def picture_grid(camera: Camera, columns: int, rows: int) -> tuple[Values, Values, Points2]:
-    """Return columns, rows and pixels (rows * columns, 2) of a grid over the whole picture [px]."""
+def image_grid(camera: Camera, columns: int, rows: int) -> tuple[Values, Values, Points2]:
+    """Return columns, rows and pixels (rows * columns, 2) of a grid over the whole image [px]."""
     x_px, y_px = np.linspace(0.0, camera.width_px - 1.0, columns), np.linspace(0.0, camera.height_px - 1.0, rows)
     return x_px, y_px, np.stack([axis.ravel() for axis in np.meshgrid(x_px, y_px)], axis=1)
 

@@ -1,23 +1,23 @@
-"""The first picture is read from the beginning of a file, and little else is read."""
+"""The first image is read from the beginning of a file, and little else is read."""
 
 from typing import Any
 
 import pytest
 from rosbags.rosbag1 import Writer
 
-from calib_core.recordings import RecordingOptions, first_picture, open_recording
+from calib_core.recordings import RecordingOptions, first_image, open_recording
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from tests.unit.recordings.conftest import Ros
 from tests.unit.recordings.containers.mcap_writing import mcap
 
 
 def numbered(jpeg: bytes, number: int) -> bytes:
-    """Return another picture of the same size: a JPEG whose comment says which one it is."""
+    """Return another image of the same size: a JPEG whose comment says which one it is."""
     return jpeg[:2] + b"\xff\xfe\x00\x06" + number.to_bytes(4, "big") + jpeg[2:]
 
 
 def two_cameras(ros, plain, jpeg, n=400):
-    """Return a recording of many small chunks with a second camera that has fewer pictures."""
+    """Return a recording of many small chunks with a second camera that has fewer images."""
     rows = []
     frames = 0
     for topic, at, message in plain(ros, jpeg, n=n):
@@ -30,13 +30,13 @@ def two_cameras(ros, plain, jpeg, n=400):
     return rows
 
 
-def test_the_first_picture_is_the_first_frame_of_the_recording(plain, jpeg, write, container):
+def test_the_first_image_is_the_first_frame_of_the_recording(plain, jpeg, write, container):
     ros = Ros(1 if container.startswith("bag") else 2)
     path = write(ros, two_cameras(ros, plain, jpeg, n=60), container)
-    picture = first_picture([path])
-    assert picture is not None
+    image = first_image([path])
+    assert image is not None
     with open_recording(path) as recording:
-        assert picture == recording.image_bytes(0)
+        assert image == recording.image_bytes(0)
         assert recording.image_topic == "/camera/image/compressed"
 
 
@@ -45,10 +45,10 @@ def test_the_camera_is_the_one_that_opening_chooses(chunk_rows, ros2, plain, jpe
     path = tmp_path / "made.mcap"
     path.write_bytes(mcap(ros2, two_cameras(ros2, plain, jpeg), chunk_rows=chunk_rows))
     with open_recording(path) as recording:
-        assert first_picture([path]) == recording.image_bytes(0)
+        assert first_image([path]) == recording.image_bytes(0)
     aside = RecordingOptions(image_topic="/aside/image/compressed")
     with open_recording(path, aside) as recording:
-        assert first_picture([path], aside) == recording.image_bytes(0)
+        assert first_image([path], aside) == recording.image_bytes(0)
 
 
 def test_little_of_a_large_bag_is_read_for_it(ros1, plain, jpeg, write, monkeypatch):
@@ -67,7 +67,7 @@ def test_little_of_a_large_bag_is_read_for_it(ros1, plain, jpeg, write, monkeypa
         return data
 
     monkeypatch.setattr(FileBytes, "up_to", counted)
-    assert first_picture([path]) is not None
+    assert first_image([path]) is not None
     assert len(read) < 20
     assert sum(read) < 1_000_000
 
@@ -98,20 +98,20 @@ def test_gaps_after_the_chunks_of_a_bag_are_not_read(ros1, plain, jpeg, tmp_path
         assert len(recording.image_times) == 30
         assert len(recording.radar_scans()) == 30
         assert recording.warnings == ()
-        assert first_picture([path]) == recording.image_bytes(0)
+        assert first_image([path]) == recording.image_bytes(0)
     assert sum(sizes) < 2_000_000
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
-def test_a_file_without_its_end_has_no_first_picture_before_it_is_opened(keep, ros, plain, jpeg, write):
+def test_a_file_without_its_end_has_no_first_image_before_it_is_opened(keep, ros, plain, jpeg, write):
     path = write(ros, plain(ros, jpeg))
     path = path if path.is_file() else next(path.glob("*.mcap"))
     path.write_bytes(path.read_bytes()[: int(keep * path.stat().st_size)])
-    assert first_picture([path]) is None
+    assert first_image([path]) is None
 
 
-def test_files_that_are_not_ros_recordings_have_no_first_picture(tmp_path):
+def test_files_that_are_not_ros_recordings_have_no_first_image(tmp_path):
     (tmp_path / "a.txt").write_text("nothing")
-    assert first_picture([tmp_path / "a.txt"]) is None
-    assert first_picture([tmp_path]) is None
-    assert first_picture([tmp_path / "missing.bag"]) is None
+    assert first_image([tmp_path / "a.txt"]) is None
+    assert first_image([tmp_path]) is None
+    assert first_image([tmp_path / "missing.bag"]) is None

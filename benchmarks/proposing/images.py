@@ -14,7 +14,7 @@ from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scene.stage import child_rng
 
-__all__ = ["ChangingLight", "KeptPictures", "SimulatedPictures"]
+__all__ = ["ChangingLight", "KeptImages", "SimulatedImages"]
 
 _JPEG_QUALITY = 90
 _PERIODS_S = (25.0, 90.0)
@@ -23,7 +23,7 @@ _COLOURED = 0.04
 _STEP = (0.75, 1.3)
 
 
-class SimulatedPictures:
+class SimulatedImages:
     """Renders any frame; its camera noise is a draw of its own, so pixels differ from those of `frames()` by noise."""
 
     def __init__(self, recording: SimulatedRecording, renderer: FrameRenderer | None = None) -> None:
@@ -33,14 +33,14 @@ class SimulatedPictures:
     def image(self, index: int, /) -> np.ndarray:
         """Render a frame, compressed as JPEG and decoded again: uint8 (h, w, 3), blue first."""
         rng = np.random.default_rng([int(child_rng(self._recording.options, 11).integers(2**31)), index])
-        pixels = self._recording.picture(index, rng, self._renderer)
+        pixels = self._recording.image(index, rng, self._renderer)
         good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        assert good, "OpenCV encodes every 8-bit picture"
+        assert good, "OpenCV encodes every 8-bit image"
         return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
 
 
 @dataclass(frozen=True, slots=True)
-class KeptPictures:
+class KeptImages:
     """Frames that come from a folder if they were asked for before, and otherwise from their source.
 
     Attributes:
@@ -61,7 +61,7 @@ class KeptPictures:
         path = self.folder / f"{index}.jpg"
         if not path.is_file():
             good, data = cv2.imencode(".jpg", self.source.image(index), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-            assert good, "OpenCV encodes every 8-bit picture"
+            assert good, "OpenCV encodes every 8-bit image"
             path.parent.mkdir(parents=True, exist_ok=True)
             unfinished = path.with_suffix(f".{os.getpid()}")
             unfinished.write_bytes(data.tobytes())

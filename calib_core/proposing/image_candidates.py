@@ -1,4 +1,4 @@
-"""Picture candidates: places in the picture that changed for one dwell, at the size that the reflector has there."""
+"""Image candidates: places in the image that changed for one dwell, at the size that the reflector has there."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ _BLOB_SIGMA = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """A part of the full picture around a candidate, kept so that no frame is decoded again.
+    """A part of the full image around a candidate, kept so that no frame is decoded again.
 
     Attributes:
-        picture: (n, m, 3) uint8.
-        corner_px: (2,) whole column and row of its first pixel in the full picture.
+        image: (n, m, 3) uint8.
+        corner_px: (2,) whole column and row of its first pixel in the full image.
     """
 
-    picture: np.ndarray
+    image: np.ndarray
     corner_px: Vector2
 
     def __post_init__(self) -> None:
@@ -30,16 +30,16 @@ class Surroundings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PictureCandidate:
-    """A place in the picture where the reflector may stand.
+class ImageCandidate:
+    """A place in the image where the reflector may stand.
 
     Attributes:
-        pixel_px: (2,) column and row of its apex, or of its centre, in the full picture.
+        pixel_px: (2,) column and row of its apex, or of its centre, in the full image.
         sigma_px: standard deviation of that pixel per axis.
         strength: how much the place differs from the same place in other dwells, in standard deviations of these.
         likeness: correlation with the reflector that a person confirmed, -1 to 1; NaN before anything is confirmed.
         has_apex: three sheets that meet in one point were found there.
-        surroundings: what the full picture shows there; None where it was not looked at.
+        surroundings: what the full image shows there; None where it was not looked at.
     """
 
     pixel_px: Vector2
@@ -53,36 +53,36 @@ class PictureCandidate:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
 
 
-def blobs(response: np.ndarray, width_px: float, *, most: int = _MOST) -> tuple[PictureCandidate, ...]:
+def blobs(response: np.ndarray, width_px: float, *, most: int = _MOST) -> tuple[ImageCandidate, ...]:
     """Return the places of the strongest change at one size, the strongest first.
 
     Args:
         response: (h, w) float32, in standard deviations; above 0 where something of that size changed.
-        width_px: of the reflector in that picture.
+        width_px: of the reflector in that image.
         most: how many.
     """
     left = response.copy()
     reach = max(3, round(_APART * width_px))
-    found: list[PictureCandidate] = []
+    found: list[ImageCandidate] = []
     for _ in range(most):
         row, column = (int(v) for v in np.unravel_index(int(np.argmax(left)), left.shape))
         strength = float(left[row, column])
         if strength <= 0.0:
             break
         pixel_px = np.array([column, row], dtype=np.float64)
-        found.append(PictureCandidate(pixel_px, _BLOB_SIGMA * width_px, strength))
+        found.append(ImageCandidate(pixel_px, _BLOB_SIGMA * width_px, strength))
         left[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1] = -np.inf
     return tuple(found)
 
 
-def surroundings_of(picture: np.ndarray, pixel_px: Vector2, half_px: float) -> Surroundings:
-    """Copy what a picture shows up to some distance from a pixel.
+def surroundings_of(image: np.ndarray, pixel_px: Vector2, half_px: float) -> Surroundings:
+    """Copy what an image shows up to some distance from a pixel.
 
     Args:
-        picture: (h, w, 3) uint8.
+        image: (h, w, 3) uint8.
         pixel_px: (2,) within it.
         half_px: how far up, down, left and right.
     """
     left, top = (max(0, int(v - half_px)) for v in pixel_px)
     right, bottom = (int(v + half_px) + 1 for v in pixel_px)
-    return Surroundings(picture[top:bottom, left:right].copy(), np.array([left, top], dtype=np.float64))
+    return Surroundings(image[top:bottom, left:right].copy(), np.array([left, top], dtype=np.float64))

@@ -9,7 +9,7 @@ import { leaveLive } from "../time/player.js";
 import { markNear, moveTo, place } from "./clicking.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { hold } from "./loupe.js";
-import { marks, redraw, zoomBy } from "./picture.js";
+import { marks, redraw, zoomBy } from "./image.js";
 
 /** A finger that moves farther than this no longer taps [CSS px]. */
 const THRESHOLD = 9;

@@ -1,6 +1,6 @@
-"""Take the pictures of the documentation: `make picture` writes docs/pictures/*.png from the sample recording.
+"""Take the images of the documentation: `make image` writes docs/images/*.png from the sample recording.
 
-`python docs/take_pictures.py --sizes` writes docs/pictures/sizes.jpg: the page in windows of five sizes, dark and light;
+`python docs/take_images.py --sizes` writes docs/images/sizes.jpg: the page in windows of five sizes, dark and light;
 `--commands` takes again only what the command line makes, the report and a frame of a video.
 """
 
@@ -25,11 +25,11 @@ from cocalib.workspace import open_workspace  # noqa: E402
 from tests.browser.driving import FLAGS, Driver  # noqa: E402
 from tests.find_browser import find_browser  # noqa: E402
 
-PICTURES = ROOT / "docs" / "pictures"
+IMAGES = ROOT / "docs" / "images"
 SIZE = {"width": 1440, "height": 900}
 SIZES = ((390, 844), (1024, 768), (1280, 720), (1440, 900), (3840, 2160))
 ROW_PX, GAP_PX = 400, 12
-"""Height of a picture in the contact sheet, and what is between two."""
+"""Height of an image in the contact sheet, and what is between two."""
 
 
 def opened(
@@ -49,11 +49,11 @@ def opened(
 
 
 def shoot(driver: Driver, name: str) -> None:
-    """Wait until the 3D view has drawn what it was told, then take the picture."""
+    """Wait until the 3D view has drawn what it was told, then take the image."""
     driver.settle()
     driver.page.wait_for_timeout(3000)
-    driver.page.screenshot(path=PICTURES / f"{name}.png")
-    print(PICTURES / f"{name}.png")
+    driver.page.screenshot(path=IMAGES / f"{name}.png")
+    print(IMAGES / f"{name}.png")
 
 
 def placed(driver: Driver, clicks: list[dict[str, Any]]) -> None:
@@ -92,7 +92,7 @@ def take_radar_only(browser: Browser, folder: Path, session: Path) -> None:
     """Look at the sample's radar without its camera: the third placement."""
     with open_recording(folder / "radar.bag", require=("radar",)) as recording:
         workspace = open_workspace(recording, camera=None, session_folder=session, name="radar.bag")
-        server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
+        server = start(workspace, recording, ServerOptions(port=0, token="images"))
         driver = opened(browser, server, "dark", "__cocalib.state.look")
         driver.until("__cocalib.state.radarMap")
         driver.press("n", "n", "n")
@@ -111,13 +111,13 @@ def take_commands(browser: Browser, sample: Path, made: Path) -> None:
     assert run(["show", *recording, "--calibration", answer, "--out", video]) == 0
     page = browser.new_page(viewport={"width": 1100, "height": 1270}, color_scheme="light")
     page.goto(report.as_uri())
-    page.screenshot(path=PICTURES / "report.png")
+    page.screenshot(path=IMAGES / "report.png")
     page.close()
     frames = cv2.VideoCapture(str(video))
     frames.set(cv2.CAP_PROP_POS_MSEC, 28_000)
     there, frame = frames.read()
     assert there
-    cv2.imwrite(str(PICTURES / "overlay.jpg"), frame, [cv2.IMWRITE_JPEG_QUALITY, 85])
+    cv2.imwrite(str(IMAGES / "overlay.jpg"), frame, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 def run(words: list[str | Path]) -> int:
@@ -132,42 +132,42 @@ def take_sizes(browser: Browser, server: RunningServer, clicks: list[dict[str, A
     first.page.close()
     rows = []
     for theme in ("dark", "light"):
-        pictures = []
+        images = []
         for width, height in SIZES:
             driver = opened(browser, server, theme, size={"width": width, "height": height})
             driver.go_to(driver.frame_at(clicks[3]["image_time"]))
             driver.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
             driver.page.wait_for_timeout(3000)  # the 3D view draws what it was told
-            pictures.append(scaled(driver.page.screenshot()))
+            images.append(scaled(driver.page.screenshot()))
             driver.page.close()
-        rows.append(beside(pictures, axis=1))
-    path = PICTURES / "sizes.jpg"
+        rows.append(beside(images, axis=1))
+    path = IMAGES / "sizes.jpg"
     cv2.imwrite(str(path), beside(rows, axis=0), [cv2.IMWRITE_JPEG_QUALITY, 78])
     print(path)
 
 
 def scaled(screenshot: bytes) -> np.ndarray:
     """Decode a screenshot and bring it to the height of a row (h, w, 3)."""
-    picture = cv2.imdecode(np.frombuffer(screenshot, np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
-    width_px = round(picture.shape[1] * ROW_PX / picture.shape[0])
-    return np.asarray(cv2.resize(picture, (width_px, ROW_PX), interpolation=cv2.INTER_AREA))
+    image = cv2.imdecode(np.frombuffer(screenshot, np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    width_px = round(image.shape[1] * ROW_PX / image.shape[0])
+    return np.asarray(cv2.resize(image, (width_px, ROW_PX), interpolation=cv2.INTER_AREA))
 
 
-def beside(pictures: list[np.ndarray], axis: int) -> np.ndarray:
-    """Join pictures (h, w, 3) with grey gaps between them."""
-    shape = (pictures[0].shape[0], GAP_PX, 3) if axis == 1 else (GAP_PX, pictures[0].shape[1], 3)
+def beside(images: list[np.ndarray], axis: int) -> np.ndarray:
+    """Join images (h, w, 3) with grey gaps between them."""
+    shape = (images[0].shape[0], GAP_PX, 3) if axis == 1 else (GAP_PX, images[0].shape[1], 3)
     gap = np.full(shape, 128, dtype=np.uint8)
-    parts = [part for picture in pictures for part in (gap, picture)]
+    parts = [part for image in images for part in (gap, image)]
     return np.concatenate(parts[1:], axis=axis)
 
 
 def main() -> None:
-    """Serve the sample with a session of its own and take the pictures."""
+    """Serve the sample with a session of its own and take the images."""
     only = sys.argv[1:]
     if only not in ([], ["--sizes"], ["--commands"]):
-        sys.exit("usage: python docs/take_pictures.py [--sizes | --commands]")
-    PICTURES.mkdir(parents=True, exist_ok=True)
+        sys.exit("usage: python docs/take_images.py [--sizes | --commands]")
+    IMAGES.mkdir(parents=True, exist_ok=True)
     folder = ROOT / "sample_data" / "rooftop"
     clicks = json.loads((folder / "clicks.json").read_text(encoding="utf-8"))["clicks"]
     with (
@@ -177,7 +177,7 @@ def main() -> None:
         workspace = open_workspace(
             recording, camera=recording.camera(), session_folder=Path(session) / "s", name="the sample recording"
         )
-        server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
+        server = start(workspace, recording, ServerOptions(port=0, token="images"))
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=str(find_browser()), args=FLAGS)
             if only == ["--sizes"]:

@@ -1,4 +1,4 @@
-/** The uncertainty in the picture: lines on which a point at some distance may be this many pixels away from its drawn place. */
+/** The uncertainty in the image: lines on which a point at some distance may be this many pixels away from its drawn place. */
 
 import { smallFont } from "../base/colours.js";
 import { addLayer } from "../base/layers.js";
@@ -23,7 +23,7 @@ export function startContours() {
   addLayer("contours", drawContours);
   group.id = "contour-chips";
   group.setAttribute("role", "group");
-  group.setAttribute("aria-label", "Uncertainty in the picture");
+  group.setAttribute("aria-label", "Uncertainty in the image");
   main.dataset.hint = HINT;
   main.dataset.contours = "";
   main.onclick = toggleContours;
@@ -97,7 +97,7 @@ function drawContours(pen) {
     label(pen, contour.label, at);
   }
   const words = labels.length ? `: lines at ${[...new Set(labels)].join(", ")}` : "";
-  group.setAttribute("aria-label", `Uncertainty in the picture${words}`);
+  group.setAttribute("aria-label", `Uncertainty in the image${words}`);
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {[number, number][]} line */

@@ -21,7 +21,7 @@ from benchmarks.paper.rows import (
     with_gross_errors,
 )
 from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, other_rig
-from benchmarks.proposing.pictures import SimulatedPictures
+from benchmarks.proposing.images import SimulatedImages
 from calib_core.arrays import Flags, Indices, Points2
 from calib_core.evaluation import BoxFigures
 from calib_core.geometry import RigidTransform
@@ -41,19 +41,19 @@ _FAR_M = 40.0
 _WIDE_PX = 1000.0
 """Of wider views every other pixel is traced, which takes most of the time."""
 View: TypeAlias = tuple[float, float, float, float]
-"""The part of a picture that is shown: left, top, width and height in its pixels."""
+"""The part of an image that is shown: left, top, width and height in its pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One picture of a figure: its title, SVG in units of its own, and what of it is shown."""
+    """One image of a figure: its title, SVG in units of its own, and what of it is shown."""
 
     title: str
     inside: str
     view: View
 
 
-def write_pictures(folder: Path, measured: Measured, settings: Settings) -> None:
+def write_images(folder: Path, measured: Measured, settings: Settings) -> None:
     """Write fig-2.svg to fig-6.svg, each of the seed whose measured figures are nearest to the medians."""
     folder.mkdir(parents=True, exist_ok=True)
     clicked = "red: clicks, blue: projected radar positions"
@@ -237,7 +237,7 @@ def _histogram(title: str, figures: BoxFigures) -> Panel:
 
 
 def _view_around(pixels_px: Points2, recording: SimulatedRecording, *, least: float) -> View:
-    """Return the part of the picture around some pixels: left, top, width, height; at least a share of its width."""
+    """Return the part of the image around some pixels: left, top, width, height; at least a share of its width."""
     camera = recording.camera
     low, high = pixels_px.min(axis=0), pixels_px.max(axis=0)
     shape = camera.width_px / camera.height_px
@@ -257,9 +257,9 @@ def _background(recording: SimulatedRecording, time: TimeNs, view: View) -> str:
     camera = recording.camera.windowed((left, top), (wide, high), (binning, binning))
     stage = replace(recording.stage, rig=replace(recording.stage.rig, camera=camera))
     frame = int(np.searchsorted(stage.frame_times.header_ns, time))
-    pixels = SimulatedPictures(replace(recording, stage=stage)).image(frame)
+    pixels = SimulatedImages(replace(recording, stage=stage)).image(frame)
     good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 78])
-    assert good, "OpenCV encodes every 8-bit picture"
+    assert good, "OpenCV encodes every 8-bit image"
     encoded = base64.b64encode(bytes(data)).decode()
     at = f'x="{left - 0.5}" y="{top - 0.5}" width="{wide}" height="{high}"'
     return f'<image {at} preserveAspectRatio="none" href="data:image/jpeg;base64,{encoded}"/>'

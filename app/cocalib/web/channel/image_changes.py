@@ -1,4 +1,4 @@
-"""How much the picture changes from one frame to the next, for the timeline; compared in the background, coarse to fine."""
+"""How much the image changes from one frame to the next, for the timeline; compared in the background, coarse to fine."""
 
 import asyncio
 import logging
@@ -20,9 +20,9 @@ _REST = 8
 """After each comparison, as many times its length is left to others."""
 _LEAST_REST_S, _PAUSE_S = 0.02, 0.5
 _ACROSS = 160
-"""Columns of the small grey pictures that are compared [px]."""
+"""Columns of the small grey images that are compared [px]."""
 _LARGEST_SHARE = 99.0
-"""Percentile of the differences within a pair of pictures: a person far away covers about a hundredth of the picture."""
+"""Percentile of the differences within a pair of images: a person far away covers about a hundredth of the image."""
 _NEXT_INTERVALS = 5
 """A frame this many usual intervals later is not the next one: there is a gap."""
 
@@ -30,12 +30,12 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class PictureChanges:
+class ImageChanges:
     """What is known so far.
 
     Attributes:
         seconds: when, from the first frame [s], ascending.
-        grey_levels: how much the most changed hundredth of the picture changes until the next frame.
+        grey_levels: how much the most changed hundredth of the image changes until the next frame.
         complete: no more will come.
     """
 
@@ -65,7 +65,7 @@ async def changes_of(
     source: Recording,
     moments: TimesNs,
     executor: Executor,
-    tell: Callable[[PictureChanges], None],
+    tell: Callable[[ImageChanges], None],
     is_busy: Callable[[], bool],
 ) -> None:
     """Compare frames with the next ones, in the background and only while nobody plays.
@@ -73,7 +73,7 @@ async def changes_of(
     Args:
         source: the recording.
         moments: (m,) stamps of its frames [ns].
-        executor: where pictures are decoded.
+        executor: where images are decoded.
         tell: takes what is known, again and again.
         is_busy: whether someone plays now.
     """
@@ -92,10 +92,10 @@ async def changes_of(
         await asyncio.sleep(max(_LEAST_REST_S, _REST * (time.monotonic() - started)))
 
 
-def _known(found: dict[int, float], moments: TimesNs, *, complete: bool) -> PictureChanges:
+def _known(found: dict[int, float], moments: TimesNs, *, complete: bool) -> ImageChanges:
     frames = sorted(found)
     seconds = tuple(round(int(moments[frame] - moments[0]) / NS_PER_S, 3) for frame in frames)
-    return PictureChanges(seconds, tuple(found[frame] for frame in frames), complete)
+    return ImageChanges(seconds, tuple(found[frame] for frame in frames), complete)
 
 
 def _change(source: Recording, index: int) -> float | None:
@@ -112,7 +112,7 @@ def _change(source: Recording, index: int) -> float | None:
 
 
 def _small(data: bytes) -> np.ndarray | None:
-    """Decode a picture to a small grey one (h, w)."""
+    """Decode an image to a small grey one (h, w)."""
     import cv2
 
     flags = cv2.IMREAD_REDUCED_GRAYSCALE_4 | cv2.IMREAD_IGNORE_ORIENTATION

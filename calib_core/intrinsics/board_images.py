@@ -1,4 +1,4 @@
-"""Where pictures of a board come from, and what is found in one."""
+"""Where images of a board come from, and what is found in one."""
 
 from dataclasses import dataclass
 from typing import Annotated, Protocol
@@ -11,22 +11,22 @@ from calib_core.json_forms import Name
 from calib_core.measurements import TimeNs
 
 
-class BoardPictures(Protocol):
-    """Pictures in which a board may be: frames of a recording or a video, or a folder of pictures."""
+class BoardImages(Protocol):
+    """Images in which a board may be: frames of a recording or a video, or a folder of images."""
 
     def __len__(self) -> int:
         """Return how many there are."""
         ...
 
     def name(self, index: int, /) -> str:
-        """Return what messages call a picture: "left01.jpg", "frame 12 (3.42 s)"."""
+        """Return what messages call an image: "left01.jpg", "frame 12 (3.42 s)"."""
         ...
 
     def time_ns(self, index: int, /) -> TimeNs | None:
         """Return when it was taken; None if nothing says."""
         ...
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         """Return its pixels: uint8 (h, w, 3), blue first. Several threads may call it at once.
 
         Raises:
@@ -37,13 +37,13 @@ class BoardPictures(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardCorners:
-    """The corners of a board in a picture.
+    """The corners of a board in an image.
 
     Attributes:
-        index: the picture's number in its source.
-        name: what messages call the picture.
+        index: the image's number in its source.
+        name: what messages call the image.
         time_ns: when it was taken; None if nothing says.
-        size_px: width and height of the picture.
+        size_px: width and height of the image.
         corner_ids: (n,) which corners of the board were found, ascending.
         pixels_px: (n, 2) where.
         blur_px: width of the edges between squares, as the standard deviation of a Gaussian [px]; NaN if not measured.
@@ -63,8 +63,8 @@ class BoardCorners:
         object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (count, 2)))
 
 
-class LeftOutPicture(Struct, frozen=True, forbid_unknown_fields=True):
-    """A picture that is not used, and why.
+class LeftOutImage(Struct, frozen=True, forbid_unknown_fields=True):
+    """An image that is not used, and why.
 
     Attributes:
         index: its number in its source.

@@ -1,4 +1,4 @@
-/** The loupe: the picture around a point, magnified 4 to 16 times, with a cross centred on the point to a fraction of a pixel. */
+/** The loupe: the image around a point, magnified 4 to 16 times, with a cross centred on the point to a fraction of a pixel. */
 
 import { ink, smallFont, smallPx } from "../base/colours.js";
 import { clickIn, on, state } from "../base/state.js";
@@ -9,7 +9,7 @@ const MAGNIFICATIONS = [4, 6, 8, 12, 16];
 const MARGIN = 8;
 /** Below the chips and the readout, on the largest screens too [CSS px]. */
 const TOP = 50;
-/** The loupe is not needed where the picture itself is magnified nearly as much: above this share. */
+/** The loupe is not needed where the image itself is magnified nearly as much: above this share. */
 const NEEDLESS_FROM = 0.75;
 /** The borders of pixels are drawn from this magnification on, quarters of the pixel under the cross from the next. */
 const GRID_FROM = 8;
@@ -67,7 +67,7 @@ function keep(now) {
   }
 }
 
-/** The wheel with Alt magnifies the loupe, not the picture. @param {WheelEvent} event */
+/** The wheel with Alt magnifies the loupe, not the image. @param {WheelEvent} event */
 function wheeled(event) {
   if (!event.altKey) return;
   event.preventDefault();

@@ -1,4 +1,4 @@
-"""A recording made of given pictures and an empty radar, for tests of page and port; simulated recordings with grey pictures."""
+"""A recording made of given images and an empty radar, for tests of page and port; simulated recordings with grey images."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ START = 1_760_000_000 * NS_PER_S + 123_456_789
 
 
 @dataclass(frozen=True)
-class Picture:
+class Image:
     data: bytes
     format: Literal["jpeg", "png"]
     width_px: int
@@ -27,10 +27,10 @@ class Picture:
 
 
 @dataclass
-class PictureRecording:
+class ImageRecording:
     """Frames at 10 Hz from arrays (h, w, 3) of uint8."""
 
-    pictures: Sequence[np.ndarray]
+    images: Sequence[np.ndarray]
     radar_topic: str = "/radar"
     image_topic: str = "/camera"
     camera_info_topic: str | None = None
@@ -55,18 +55,18 @@ class PictureRecording:
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        self._data = [cv2.imencode(".png", picture)[1].tobytes() for picture in self.pictures]
-        self.image_times = START + np.arange(len(self.pictures), dtype=np.int64) * (NS_PER_S // 10)
+        self._data = [cv2.imencode(".png", image)[1].tobytes() for image in self.images]
+        self.image_times = START + np.arange(len(self.images), dtype=np.int64) * (NS_PER_S // 10)
 
-    def image_bytes(self, index: int) -> Picture:
-        height_px, width_px = self.pictures[index].shape[:2]
-        return Picture(self._data[index], "png", width_px, height_px)
+    def image_bytes(self, index: int) -> Image:
+        height_px, width_px = self.images[index].shape[:2]
+        return Image(self._data[index], "png", width_px, height_px)
 
     def image(self, index: int) -> np.ndarray:
-        return self.pictures[index]
+        return self.images[index]
 
     def camera(self) -> Camera | None:
-        height_px, width_px = self.pictures[0].shape[:2]
+        height_px, width_px = self.images[0].shape[:2]
         return Camera(
             "pinhole", width_px, height_px, np.array([[500, 0, width_px / 2], [0, 500, height_px / 2], [0, 0, 1]])
         )
@@ -81,14 +81,14 @@ class PictureRecording:
         return ()
 
 
-def grey_pictures(count: int, width_px: int = 320, height_px: int = 240) -> list[np.ndarray]:
-    """Return plain pictures, each of another grey."""
+def grey_images(count: int, width_px: int = 320, height_px: int = 240) -> list[np.ndarray]:
+    """Return plain images, each of another grey."""
     return [np.full((height_px, width_px, 3), 20 + 10 * index % 200, dtype=np.uint8) for index in range(count)]
 
 
 @contextmanager
 def grey_frames() -> Iterator[None]:
-    """Leave what is simulated meanwhile grey: where nobody looks at the pictures, rendering them is most of the work."""
+    """Leave what is simulated meanwhile grey: where nobody looks at the images, rendering them is most of the work."""
 
     def frames(recording: SimulatedRecording, limit: int | None = None) -> Iterator[SimulatedFrame]:
         grey = np.full((recording.camera.height_px, recording.camera.width_px, 3), 90, np.uint8)

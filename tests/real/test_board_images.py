@@ -18,17 +18,17 @@ BOARD = board_of_size("9x6", 25.0)
 def test_corners_are_at_least_as_good_as_opencvs(side, rms_px, shared_data):
     files = sorted((shared_data / "real_checkerboards").glob(f"{side}[01]*.jpg"))
     assert len(files) == 13
-    found = [(picture, find_board(picture, BOARD)) for picture in (cv2.imread(str(file)) for file in files)]
+    found = [(image, find_board(image, BOARD)) for image in (cv2.imread(str(file)) for file in files)]
     corners = [one[1] for _, one in found if one is not None]
     assert len(corners) == 13
     flat = [BOARD.corners_m.astype(np.float32)] * 13
     rms, *_ = cv2.calibrateCamera(flat, [c.astype(np.float32) for c in corners], (640, 480), None, None)
     assert rms <= rms_px
-    assert all(0.6 < blur_px(picture, *one, BOARD) < 1.5 for picture, one in found if one is not None)
+    assert all(0.6 < blur_px(image, *one, BOARD) < 1.5 for image, one in found if one is not None)
 
 
 class Photographs:
-    """Pictures by name."""
+    """Images by name."""
 
     def __init__(self, shown: dict[str, np.ndarray]) -> None:
         self._names, self._shown = list(shown), list(shown.values())
@@ -42,7 +42,7 @@ class Photographs:
     def time_ns(self, index: int, /) -> TimeNs | None:
         return None
 
-    def picture(self, index: int, /) -> np.ndarray:
+    def image(self, index: int, /) -> np.ndarray:
         return self._shown[index]
 
 

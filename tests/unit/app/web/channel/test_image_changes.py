@@ -1,4 +1,4 @@
-"""How much the picture changes: much where something moves, little where it stands still; not measured while someone plays."""
+"""How much the image changes: much where something moves, little where it stands still; not measured while someone plays."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -6,21 +6,21 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from calib_core.measurements import NS_PER_S
-from cocalib.web.channel.picture_changes import PictureChanges, changes_of, comparison_order
-from tests.picture_recording import START, PictureRecording
+from cocalib.web.channel.image_changes import ImageChanges, changes_of, comparison_order
+from tests.image_recording import START, ImageRecording
 
 
 def walker(column_px: int) -> np.ndarray:
-    """Draw a person, dark on noise, 1 % of the picture."""
+    """Draw a person, dark on noise, 1 % of the image."""
     rng = np.random.default_rng(column_px)
-    picture = rng.normal(140, 3, (360, 640, 3)).clip(0, 255).astype(np.uint8)
-    picture[150:240, column_px : column_px + 26] = 40
-    return picture
+    image = rng.normal(140, 3, (360, 640, 3)).clip(0, 255).astype(np.uint8)
+    image[150:240, column_px : column_px + 26] = 40
+    return image
 
 
-def compared(recording: PictureRecording, busy: list[bool]) -> list[PictureChanges]:
+def compared(recording: ImageRecording, busy: list[bool]) -> list[ImageChanges]:
     """Compare all frames; return what was told."""
-    told: list[PictureChanges] = []
+    told: list[ImageChanges] = []
 
     async def run() -> None:
         with ThreadPoolExecutor(1) as executor:
@@ -31,8 +31,8 @@ def compared(recording: PictureRecording, busy: list[bool]) -> list[PictureChang
     return told
 
 
-def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not():
-    recording, busy = PictureRecording([walker(100), walker(100), walker(100), walker(130), walker(160)]), [True]
+def test_a_person_who_walks_changes_the_image_and_one_who_stands_does_not():
+    recording, busy = ImageRecording([walker(100), walker(100), walker(100), walker(130), walker(160)]), [True]
     last = compared(recording, busy)[-1]
     assert busy == [], "they are compared only while nobody plays"
     assert last.complete

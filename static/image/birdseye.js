@@ -1,5 +1,5 @@
 /**
- * A recording without pictures, seen from above: static returns of the whole recording, those of the last seconds, and the placements;
+ * A recording without images, seen from above: static returns of the whole recording, those of the last seconds, and the placements;
  * with its controls and the table of placements.
  */
 
@@ -270,8 +270,8 @@ const group = /** @type {HTMLElement} */ (document.getElementById("look-options"
 const legend = /** @type {HTMLElement} */ (document.getElementById("legend"));
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 const TRAILS_S = [0, 2, 10];
-/** Controls that need pictures. */
-const NEED_PICTURES = ["undo", "redo", "export"];
+/** Controls that need images. */
+const NEED_IMAGES = ["undo", "redo", "export"];
 
 export function startLooking() {
   startBirdseye();
@@ -285,12 +285,12 @@ export function startLooking() {
   });
 }
 
-/** Show what is there without pictures, once. */
+/** Show what is there without images, once. */
 function enter() {
   document.body.classList.toggle("looking", state.looking);
   if (!state.looking) return;
-  const why = "There are no pictures in this recording: nothing can be clicked. Add the camera's file to calibrate.";
-  for (const id of NEED_PICTURES) {
+  const why = "There are no images in this recording: nothing can be clicked. Add the camera's file to calibrate.";
+  for (const id of NEED_IMAGES) {
     const button = /** @type {HTMLButtonElement} */ (document.getElementById(id));
     button.disabled = true;
     button.dataset.hint = why;

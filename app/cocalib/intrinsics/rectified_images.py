@@ -8,31 +8,31 @@ from calib_core.camera import Camera
 from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.intrinsics import CalibratedLens, LensView
 from cocalib.hypothesis_sheet import png
-from cocalib.intrinsics.picture_sources import OpenPictures
+from cocalib.intrinsics.image_sources import OpenImages
 
 _COLOUR = (80, 220, 255)
 
 
-def rectified_pictures(pictures: OpenPictures, lens: CalibratedLens) -> Iterator[tuple[str, bytes]]:
-    """Rectify the pictures of the used views.
+def rectified_images(images: OpenImages, lens: CalibratedLens) -> Iterator[tuple[str, bytes]]:
+    """Rectify the images of the used views.
 
     Args:
-        pictures: where the views were found.
+        images: where the views were found.
         lens: with the views.
 
     Yields:
-        the name of each picture, and a PNG file.
+        the name of each image, and a PNG file.
 
     Raises:
-        CalibrationError: a picture cannot be read any more, or the lens cannot be rectified.
+        CalibrationError: an image cannot be read any more, or the lens cannot be rectified.
     """
     import cv2
 
     straight = rectified_camera(lens.camera)
     maps = rectification_maps(lens.camera, straight)
     for view in lens.views:
-        picture = pictures.picture(view.corners.index)
-        drawn = cv2.remap(picture, maps.x_px, maps.y_px, cv2.INTER_LINEAR)
+        image = images.image(view.corners.index)
+        drawn = cv2.remap(image, maps.x_px, maps.y_px, cv2.INTER_LINEAR)
         for begin, end in _guides(lens, view, straight):
             cv2.line(drawn, begin, end, _COLOUR, 1, cv2.LINE_AA)
         yield view.corners.name, png(drawn)
