@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import tomllib
 from functools import partial
 from pathlib import Path
@@ -43,9 +44,7 @@ def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(cocalib,
     assert rounded.out == exact.out
     notes = rounded.err.splitlines()
     assert len(notes) == 3
-    assert notes[0].startswith(
-        "note: click c0 at 1700000002.001000000 s has the stamp of no frame; the nearest is frame 5"
-    )
+    assert re.match("note: click c0 at 1700000002.001000000 s .* frame 5", notes[0])
 
 
 def test_nan_returns_do_not_shift_the_clicks(solved, cocalib, made, clicks_file, tmp_path):
@@ -70,7 +69,7 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_f
     out, again, plain = (tmp_path / name for name in ("refined.json", "again.json", "plain.json"))
     answer = cocalib("solve", "--pairs", pairs_file, "--out", out, "--refine-intrinsics")
     assert answer.code == 0, answer.err
-    assert "intrinsics: The intrinsics were refined with the pose: " in answer.out
+    assert "intrinsics were refined" in answer.out
     document = json.loads(out.read_text())
     assert document["options"]["refining"]["intrinsics"] is True
     assert document["given_camera"]["matrix_px"] != document["camera"]["matrix_px"]
@@ -139,7 +138,7 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
         has_size = "size" in file.holds_camera
         if not has_size:
             refused = cocalib("import", folder / file.file_name, "--out", out)
-            assert "give it with --image-size WIDTH HEIGHT" in refused.err
+            assert "--image-size WIDTH HEIGHT" in refused.err
         size = [] if has_size else ["--image-size", *map(str, SIZE)]
         assert cocalib("import", folder / file.file_name, "--out", out, *size).code == 3
         written = read_calibration(out.read_text(encoding="utf-8")).calibration
@@ -165,7 +164,7 @@ def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_
     assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()} | beside
     (note,) = (line for line in answer.err.splitlines() if line.endswith(POSE_ONLY))
     assert note.startswith("note: tf2, tf2-launch-py, ")
-    assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err
+    assert "5 m to 15 m" in answer.err
 
 
 def test_all_formats_take_the_parent_and_the_rectified_images_where_they_apply(cocalib, golden, tmp_path):
@@ -180,8 +179,8 @@ def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, solved, 
     info, back = tmp_path / "camera_info.yaml", tmp_path / "back.json"
     written = cocalib("export", solved, "--to", "camera-info", "--out", info)
     assert written.code == 0
-    assert "contains the camera only, without the pose" in written.err
-    assert "no pose of a camera and a radar in it" in cocalib("check", info).err
+    assert "the camera only" in written.err
+    assert "no pose" in cocalib("check", info).err
     tf2 = tmp_path / "tf.sh"
     assert cocalib("export", solved, "--to", "tf2", "--out", tf2).code == 0
     assert cocalib("import", tf2, "--camera", info, "--out", back).code == 0
@@ -195,13 +194,13 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, 
     assert cocalib("export", solved, "--to", "kitti", "--rectified", "--out", kitti).code == 0
     refused = cocalib("import", kitti, "--out", back)
     assert refused.code == 2
-    assert "states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT" in refused.err
+    assert "--image-size WIDTH HEIGHT" in refused.err
     assert cocalib("import", kitti, "--out", back, "--image-size", "320", "240").code == 0
     (tmp_path / "image_2").mkdir()
     cv2.imwrite(str(tmp_path / "image_2" / "00000.png"), np.zeros((240, 320, 3), np.uint8))
     beside = tmp_path / "beside.json"
     answer = cocalib("import", kitti, "--out", beside)
-    assert "image size 320 x 240 px from the images beside the file" in answer.err
+    assert "size 320 x 240" in answer.err
     cameras = [json.loads(path.read_text())["camera"] for path in (back, beside)]
     assert cameras[0] == cameras[1]
     assert (cameras[0]["model"], cameras[0]["width_px"], cameras[0]["height_px"]) == ("pinhole", 320, 240)
@@ -215,11 +214,11 @@ def test_a_format_without_a_place_for_distortion_is_written_for_rectified_images
     out = tmp_path / "calib.txt"
     refused = cocalib("export", solved, "--to", "kitti")
     assert refused.code == 2
-    assert "kitti comes with rectification.npz and needs a file or folder: --out calib.txt" in refused.err
+    assert "a file or folder: --out" in refused.err
     written = cocalib("export", solved, "--to", "kitti", "--out", out)
     assert written.code == 0
     assert f"written to {tmp_path / 'rectification.npz'}" in written.out
-    assert "make them with the maps in rectification.npz" in written.err
+    assert "maps in rectification.npz" in written.err
     assert "say so with --rectified" in written.err
     assert cocalib("check", out, "--against", solved).code == 0
     with np.load(tmp_path / "rectification.npz") as maps:
@@ -229,7 +228,7 @@ def test_a_format_without_a_place_for_distortion_is_written_for_rectified_images
 
     written = cocalib("export", solved, "--to", "kitti", "--rectified", "--out", out)
     assert written.code == 0
-    assert "note: written for rectified images" in written.err
+    assert "for rectified images" in written.err
     assert cocalib("check", out, "--against", solved).code == 0
     assert cocalib("export", solved, "--to", "opencv", "--rectified").code == 2
 
@@ -293,7 +292,7 @@ def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(coc
     assert cocalib("info", recording, "--write").code == 2, "never over another one"
     file.write_text('clock = "receive"\nimage_topic = "/camera/image/compressed"\n')
     told = cocalib("solve", recording, "--clicks", clicks_file, "--out", out)
-    assert told.err.startswith('using recording.toml: clock = "receive", image_topic = "/camera/image/compressed"\n')
+    assert 'recording.toml: clock = "receive", image_topic' in told.err
     (kept,) = (one for one in json.loads(out.read_text())["provenance"]["inputs"] if one["name"] == "recording.toml")
     assert kept["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
     typed = cocalib("info", recording, "--clock", "header")
@@ -328,4 +327,4 @@ def test_a_recording_toml_of_two_recordings_serves_one_of_them(cocalib, made):
     )
     answer = cocalib("info", alone)
     assert answer.code == 0
-    assert answer.err == 'using recording.toml: radar_topic = "/radar/points"\n'
+    assert answer.err.endswith('radar_topic = "/radar/points"\n')

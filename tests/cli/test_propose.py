@@ -43,9 +43,9 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib
     assert answer.code == 0, answer.err
     head, *rows, summary, written = answer.out.splitlines()
     assert head.split()[:3] == ["id", "time", "[s]"]
-    assert "nobody has confirmed them yet" in summary
+    assert "nobody has confirmed" in summary
     assert written == f"written to {out}"
-    assert "looking at the images: 11 of 11 placements" in answer.err
+    assert "11 of 11 placements" in answer.err
 
     document = json.loads(out.read_text())
     msgspec.convert(document, ProposalsDocument, dec_hook=from_json)
@@ -158,7 +158,7 @@ def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_re
 def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(cocalib, recording, solved):
     answer = cocalib("solve", recording, *SIZE, "--auto", "--clicks", solved.clicks)
     assert (answer.code, answer.out) == (2, "")
-    assert f"{solved.clicks}: nobody confirmed 11 of its clicks" in answer.err
+    assert f"{solved.clicks}: nobody confirmed 11" in answer.err
 
 
 def test_the_sample_is_solved_without_a_person(cocalib, project_root, tmp_path):
@@ -187,7 +187,7 @@ def test_frames_that_show_no_placement_are_said(cocalib, tmp_path):
     path = write_ros2(tmp_path / "early.mcap", messages, container="mcap")
     answer = cocalib("solve", "--propose", path, *SIZE)
     assert (answer.code, answer.out) == (1, "")
-    assert "The camera recorded no frame during any of the 11 placements" in answer.err
+    assert "no frame during any" in answer.err
 
 
 def test_the_images_of_another_recording_are_refused(cocalib, tmp_path):

@@ -7,10 +7,10 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_image_and_names_n
     out = tmp_path / "report.html"
     assert cocalib("evaluate", solved_sample, *bags, "--against", solved_sample, "--report", out).code == 0
     html = out.read_text(encoding="utf-8")
-    assert "Residuals at the clicks in camera.bag + radar.bag, which it was solved from" in html
+    assert "in camera.bag + radar.bag" in html
     assert "data:image/jpeg;base64," in html
     assert 'class="return"' in html
-    assert "no difference on this recording" in html.lower()
+    assert "no difference" in html.lower()
     for folder in (solved_sample.parent, sample, tmp_path):
         assert str(folder) not in html
     assert len(html.encode()) < 3_000_000
@@ -22,8 +22,8 @@ def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(c
     for recording, has_camera in (((), False), ((solved.with_name("made.mcap"), "--clicks", clicks_file), True)):
         assert cocalib("evaluate", foreign, *recording, "--report", out).code == 0
         html = out.read_text(encoding="utf-8")
-        assert ("The file contains no camera" in html) == (not has_camera)
-        assert ("Residuals at the clicks in made.mcap" in html) == has_camera
+        assert ("contains no camera" in html) == (not has_camera)
+        assert ("clicks in made.mcap" in html) == has_camera
 
 
 def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(cocalib, golden, tmp_path, monkeypatch):
@@ -31,5 +31,5 @@ def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(cocalib, g
     out, pdf = tmp_path / "out.html", tmp_path / "out.pdf"
     answer = cocalib("evaluate", golden, "--report", pdf, "--report", out)
     assert answer.code == 2
-    assert "COCALIB_BROWSER=/nowhere/browser is not a program" in answer.err
+    assert "COCALIB_BROWSER=/nowhere/browser" in answer.err
     assert (out.exists(), pdf.exists()) == (True, False)
