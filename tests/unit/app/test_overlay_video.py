@@ -143,4 +143,4 @@ def test_an_interrupted_video_leaves_nothing(view, tmp_path):
         write_overlay(view, tmp_path / "out.mp4", OverlayOptions(("c.json",)), progress=stop)
     assert list(tmp_path.iterdir()) == []
     start = TimeNs(1_700_000_000 * NS_PER_S + 5_000_000)
-    assert time_text(TimeNs(start + 1_500_000_000), start) == "2023-11-14 22:13:21.505 UTC   +1.50 s"
+    assert time_text(TimeNs(start + 1_500_000_000), start).split("   ") == ["2023-11-14 22:13:21.505 UTC", "+1.50 s"]

@@ -160,13 +160,10 @@ def test_with_another_camera_the_images_are_looked_at_again(finding, watched):
 
 def test_why_there_are_none_is_said(finding, watched):
     finding.allowed.set()
-    finding.end = Unsolvable.reported("no-camera", "the camera intrinsics are missing", "calibrate the lens")
+    finding.end = Unsolvable.reported("no-camera", "no intrinsics", "calibrate the lens")
     watched.job.ask(replace(WISH, camera=None))
     failed = watched.until("failed", 0)
-    assert (failed.progress.problem, failed.progress.hint) == (
-        "the camera intrinsics are missing",
-        "calibrate the lens",
-    )
+    assert (failed.progress.problem, failed.progress.hint) == ("no intrinsics", "calibrate the lens")
     finding.error = RecordingError("camera.bag: frame 7 cannot be read")
     watched.job.ask(replace(WISH))
     watched.job.stop()

@@ -53,7 +53,7 @@ def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address, tmp_p
 def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(address, capsys):
     with pytest.raises(InputError, match=rf"--scheduler {address}: it has no workers; start some with `dask worker"):
         list(DaskScheduler(address).run_all(squared, [(1,)]))
-    assert capsys.readouterr().err == f"{address} has no workers; waiting 1 s more for one to start\n"
+    assert capsys.readouterr().err.startswith(f"{address} has no workers")
 
 
 def test_a_worker_of_another_version_is_told_before_any_job_runs(address, tmp_path):

@@ -101,12 +101,12 @@ def test_what_another_driver_finished_is_not_run_again(tmp_path, monkeypatch):
 
 def test_a_bug_in_one_job_is_its_outcome(tmp_path, monkeypatch):
     def broken(job, _):
-        raise RuntimeError(f"no such thing as {job.row.vehicle}")
+        raise RuntimeError(f"not {job.row.vehicle}")
 
     monkeypatch.setattr(running_job, "run_job", broken)
     outcomes = drive(quick_jobs(tmp_path, 2), InProcess(), ResultsFolder(tmp_path))
     assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
-    assert "RuntimeError: no such thing as v001" in outcomes[1].reason
+    assert "RuntimeError: not v001" in outcomes[1].reason
     assert written(tmp_path, outcomes[1].digest) == outcomes[1]
 
 

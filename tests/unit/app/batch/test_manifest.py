@@ -114,7 +114,7 @@ def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
     for name in ("sessions.yaml", "sessions.csv"):
-        assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
+        assert "cocalib batch FILE.toml --init" in fault_of("a: 1", tmp_path, name)
     with pytest.raises(
         InputError, match=r"no such file or folder; cocalib batch .*absent\.toml --init FOLDER writes one"
     ):

@@ -167,8 +167,8 @@ def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watc
     failed = ended("failed")
     assert (failed.problem, failed.hint) == ("no board was seen", "film the board")
     assert failed.lens is former
-    search.error = RecordingError("frame 1 cannot be read")
-    assert ended("failed").problem == "frame 1 cannot be read"
+    search.error = RecordingError("frame 1 is cut")
+    assert ended("failed").problem == "frame 1 is cut"
     search.error = KeyError("a bug")
     assert "KeyError" in ended("failed").problem, "it ends the calibration and not the program"
 

@@ -45,8 +45,8 @@ def test_a_residual_that_shrinks_with_range_points_at_the_position():
 
 
 def test_a_shift_that_all_residuals_share_is_named_with_its_size():
-    assert shift_sentence(planted_rows(shift_px=4.0)).startswith("The residuals lean together by (4")
-    assert shift_sentence(planted_rows()).startswith("The residuals share no direction")
+    assert "together by (4" in shift_sentence(planted_rows(shift_px=4.0))
+    assert "no direction" in shift_sentence(planted_rows())
 
 
 def test_the_halves_in_a_sentence_are_those_of_the_data():
@@ -82,4 +82,4 @@ def test_chance_alone_is_seldom_called_a_trend():
 
 @pytest.mark.parametrize("sentence", [range_sentence, azimuth_sentence, _place, time_sentence, shift_sentence])
 def test_few_pairs_show_no_trend_and_the_sentence_says_so(sentence):
-    assert sentence(planted_rows(n=5)) == "5 clicks are too few to show a trend; 8 or more are needed."
+    assert sentence(planted_rows(n=5)).startswith("5 clicks are too")

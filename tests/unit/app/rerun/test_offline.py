@@ -57,7 +57,7 @@ def test_commands_without_rerun_work_where_it_is_missing(project_root):
 def test_commands_that_need_rerun_say_how_to_install_it(more, tmp_path):
     answer = without_rerun("show", tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
     assert answer.returncode == 2
-    assert "needs rerun-sdk, which is not installed" in answer.stderr
+    assert "needs rerun-sdk" in answer.stderr
     assert "pip install 'cocalib[rerun]'" in answer.stderr
     assert "Traceback" not in answer.stderr
 

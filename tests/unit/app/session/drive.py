@@ -33,7 +33,7 @@ def kept(folder: Path, *steps: Step, facts: RecordingFacts = FACTS) -> History:
     """Apply steps in a session, new or continued, and close it."""
     session_file = open_session_file(folder, facts)
     history = keep(session_file, *steps, facts=facts)
-    assert session_file.close().note.startswith("all clicks are saved in ")
+    assert session_file.close().note.startswith("all clicks are saved")
     return history
 
 

@@ -90,14 +90,14 @@ def test_a_pair_whose_return_the_pose_picked_against_the_radar_s_own_score_says_
     ]
 
     assert told
-    assert all("though the radar alone prefers" in why for why in told)
+    assert all("the radar alone prefers" in why for why in told)
 
 
 def test_a_calibration_compared_with_itself_differs_by_nothing(solved):
     both = compared(4, solution_of("now", solved), solution_of("again", solved))
 
     assert [row.text.split()[0] for row in both.rows[:5]] == ["0"] * 5
-    assert both.verdict.startswith("The two agree: chi2 0 <= ")
+    assert "agree: chi2 0 <= " in both.verdict
     assert all(mark.a_px == mark.b_px for mark in both.marks)
 
 
@@ -151,5 +151,5 @@ def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved)
     by_hand = replace(pair, measured=replace(pair.measured, candidates=(first,), set_aside=tuple(rest), chosen=chosen))
     told = pair_review(replace(solved, pairs=(by_hand,)), pair.id)
 
-    assert "because it was chosen by hand" in str(told.why)
+    assert "chosen by hand" in str(told.why)
     assert [row.chosen for row in told.candidates] == [True] + [False] * len(rest)

@@ -125,10 +125,10 @@ def test_clicks_that_changed_their_return_are_told_until_the_next_answer():
     assert "changed" not in view(history, FACTS).status
     preview = Solved(6, replace(after, checking=True))
     history = advance(advance(history, ClickMoved("c1", (11.0, 20.0)), FACTS), preview, FACTS)
-    assert view(history, FACTS).status == "1 click changed its return"
+    assert view(history, FACTS).status.startswith("1 click changed")
     assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status, "it was taken back"
     history = advance(history, Solved(6, after), FACTS)
-    assert view(history, FACTS).status == "1 click changed its return"
+    assert view(history, FACTS).status.startswith("1 click changed")
     again = advance(history, ClickMoved("c1", (12.0, 20.0)), FACTS)
     assert "changed" not in view(advance(again, Solved(7, after), FACTS), FACTS).status
 
@@ -283,20 +283,20 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
     outcome = calibration(
         *FIVE,
         warnings=(DataWarning.reported("a", "b", "c"),),
-        unpaired=(Unpaired.reported("c9", "no-scan", "no scan", "click elsewhere"),),
+        unpaired=(Unpaired.reported("c9", "no-scan", "lost", "wait"),),
     )
     lines = tuple(map(str, summary_lines(outcome)))
     assert [line.partition(":")[0] for line in lines[:3]] == ["verdict", "assuming", "next"]
     assert lines[3] == "AED                12.4 px"
-    assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
+    assert lines[-2:] == ("warning: B. C.", "unpaired: c9: Lost. Wait.")
 
 
 def test_the_summary_says_a_contradiction_once():
-    contradiction = DataWarning.reported("units-suspected", "the ranges look like feet", "give them in metres")
+    contradiction = DataWarning.reported("units-suspected", "in feet", "give metres")
     lines = tuple(
         map(str, summary_lines(calibration(*FIVE, warnings=(contradiction, DataWarning.reported("a", "b", "c")))))
     )
-    assert (lines[0], lines[1]) == ("verdict: contradictory: the ranges look like feet", "next: Give them in metres.")
+    assert (lines[0], lines[1]) == ("verdict: contradictory: in feet", "next: Give metres.")
     assert [line for line in lines if line.startswith("warning")] == ["warning: B. C."]
 
 

@@ -97,7 +97,7 @@ def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera(direct
 )
 def test_of_two_poses_in_a_third_frame_the_file_s_own_numbers_are_shown(file, key, third):
     made = preview(file, key, "parent_from_radar=1.25,-0.5,0.75,0,0,0.6,0.8")
-    assert f"are the poses of 'radar' and of {made.pose.camera_frame!r}" in made.pose.words
+    assert f"of 'radar' and of {made.pose.camera_frame!r}" in made.pose.words
     assert [table.title for table in made.pose.in_third_frame] == [
         f"Pose of {name} in {third}" for name in ("radar", made.pose.camera_frame)
     ]

@@ -121,7 +121,7 @@ def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path):
         with (tmp_path / "drive.mcap").open("r+b") as file:
             file.truncate(50)
         await until(lambda: pages.note.state == "ended")
-        assert "was truncated to 50 bytes" in pages.note.words
+        assert "to 50 bytes" in pages.note.words
         assert pages.note.words.endswith("All clicks are kept.")
         assert len(workspace.session.clicks) == 1
 

@@ -105,7 +105,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeyp
 
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         early = await desk.averaged(SnapWanted(time, (31.0, 25.0), over_dwell=True))
-        assert (early.pixel_px, early.words) == (None, "The images of this placement were not looked at.")
+        assert (early.pixel_px, "not looked at" in early.words) == (None, True)
         desk.surveyed(PLACEMENTS)
         await until(told, lambda one: one.progress.stage == "ready")
         found = await desk.averaged(SnapWanted(time, (31.5, 25.0), over_dwell=True))
@@ -114,7 +114,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeyp
         assert f"{found.sigma_px:.2f} px" in found.words
         missed = await desk.averaged(SnapWanted(time, (8.0, 8.0), over_dwell=True))
         assert missed.pixel_px is None
-        assert missed.words == "The images of this placement show no apex there."
+        assert "no apex" in missed.words
         between = await desk.averaged(SnapWanted(TimeNs(time + 1), (31.0, 25.0), over_dwell=True))
         assert between.pixel_px is None
         assert not workspace.session.clicks
