@@ -11,6 +11,8 @@ from types import FrameType
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 _AGAIN_S = 0.02
+_GRACE_S = 10.0
+"""How long closing may take after SIGTERM."""
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8  # as <malloc.h> has them
 _KEPT_BYTES = 64 << 20
 _LARGEST_BYTES = 32 << 20
@@ -19,6 +21,8 @@ _BACKGROUND = 10  # niceness
 
 def stop_on_signals() -> None:
     """Raise KeyboardInterrupt at the first of these signals; ignore the later ones, so that closing is not interrupted.
+
+    At a SIGTERM, be it the first or a later one, a timer starts with which the system ends what is then still running.
 
     A signal that whoever started the program has switched off stays off: `nohup` does that to SIGHUP, a shell to the
     SIGINT of a program in the background. The exception carries the number of the signal.
@@ -31,10 +35,21 @@ def stop_on_signals() -> None:
     sys.unraisablehook = partial(_unraisable, sys.unraisablehook, heard)
 
 
-def _stop(number: int, _: FrameType | None) -> None:
+def _stop(number: int, frame: FrameType | None) -> None:
     for other in _numbers():
-        signal.signal(other, signal.SIG_IGN)
+        if signal.getsignal(other) is _stop:
+            signal.signal(other, _end_in_time if other == signal.SIGTERM else signal.SIG_IGN)
+    if number == signal.SIGTERM:
+        _end_in_time(number, frame)
     raise KeyboardInterrupt(number)
+
+
+def _end_in_time(_number: int, _: FrameType | None) -> None:
+    """Let the system end the process soon, whatever a parser, a C call or a thread is at."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, _GRACE_S)
 
 
 def _unraisable(

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import signal
 import subprocess
 import sys
 import threading
@@ -34,6 +35,48 @@ def test_a_signal_that_comes_while_an_object_is_deleted_ends_the_program():
     done = subprocess.run([sys.executable, "-c", _ENDS], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "ended by 15"
     assert done.stderr == ""
+
+
+_HELD_UP = """
+import itertools, signal, threading
+from cocalib.platform import process
+process._GRACE_S = 0.2
+process.stop_on_signals()
+def busy():
+    while True:
+        pass
+def serve():
+    print("serving", flush=True)
+    threading.Event().wait(50)
+try:
+    {before}
+except KeyboardInterrupt:
+    {after}
+"""
+_HELD_UP_BY = {
+    "a thread": ("threading.Thread(target=busy).start(); serve()", "pass"),
+    "a loop": ("serve()", "busy()"),
+    "a C call": ("serve()", "sum(itertools.repeat(0))"),
+    "an earlier Ctrl+C": ("serve()", "signal.raise_signal(signal.SIGTERM) or busy()"),
+}
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no timer that ends a process")
+@pytest.mark.parametrize("held_up_by", _HELD_UP_BY)
+def test_ten_sigterms_end_the_program_whatever_holds_it_up(held_up_by):
+    before, after = _HELD_UP_BY[held_up_by]
+    number = signal.SIGINT if held_up_by == "an earlier Ctrl+C" else signal.SIGTERM
+    start = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program = start + _HELD_UP.format(before=before, after=after)
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as running:
+        try:
+            assert running.stdout is not None
+            assert running.stdout.readline() == "serving\n"
+            for _ in range(10):
+                running.send_signal(number)
+            assert running.wait(timeout=60) == -signal.SIGALRM
+        finally:
+            running.kill()
 
 
 _FAULTS = """

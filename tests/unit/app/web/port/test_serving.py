@@ -20,6 +20,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from cocalib.cli import run
 from cocalib.session import ClickPlaced
+from cocalib.session.file import inspect_session
 from cocalib.web.messages import Opening
 from cocalib.web.port import serving
 from cocalib.web.port.link import ServerOptions
@@ -28,6 +29,7 @@ from cocalib.web.port.serving import Service
 from cocalib.workspace import Workspace, open_workspace
 from tests.image_recording import START, ImageRecording, grey_images
 from tests.port_client import channel, come_in, get, wanted
+from tests.served_process import ServedProcess
 
 OPENING = Opening("long.bag", "Opening long.bag")
 RECORDING = ImageRecording(grey_images(3))
@@ -353,6 +355,40 @@ def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_int
     assert (running.returncode, errors) == (0, "")
     assert "all clicks are saved" in out
     assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
+
+
+PARSES_FOR_EVER = f"""{PRINTS_WHEN_IT_SERVES}
+from calib_core.parsing import yaml_documents
+from cocalib.platform import process
+from cocalib.session.file import SessionFile
+process._GRACE_S = 0.5
+def parse_for_ever(_):
+    while True:
+        yaml_documents("[" + "1, " * 9000 + "]", source="camera.yaml")
+SessionFile.close = parse_for_ever
+"""
+
+
+@POSIX_SIGNALS
+def test_ten_sigterms_within_a_parse_end_the_program_and_confirmed_clicks_are_on_the_disk(tmp_path):
+    session = tmp_path / "session"
+    running = started(["demo", "--no-browser", "--port", 0, "--session", session], patch=PARSES_FOR_EVER)
+    try:
+        url = next(line for line in running.stdout if "http://" in line).split()[-1]
+        assert printed(running, "serving")
+        server = ServedProcess(running, url)
+        with channel(server, come_in(server)) as socket:
+            socket.send('{"type":"hello"}')
+            first = wanted(socket, "recording")["start"]
+            socket.send(json.dumps({"type": "click_placed", "image_time": first, "pixel_px": [9, 9], "request": 1}))
+            wanted(socket, "done")
+            for _ in range(10):
+                running.send_signal(signal.SIGTERM)
+        running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == -signal.SIGALRM
+    assert len(inspect_session(session).clicks) == 1
 
 
 def test_a_large_recording_has_its_link_before_it_is_opened(tmp_path, monkeypatch, capsys):
