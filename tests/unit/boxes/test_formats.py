@@ -82,7 +82,7 @@ def test_boxes_with_the_names_of_the_images_belong_to_them(tmp_path, kind):
             write(path, f"{name}.txt", "0 0.1875 0.2083 0.0625 0.2083")
     boxes = read_boxes(path, image_times=TIMES, image_size_px=SIZE, image_names=NAMED)
     assert [frame.image_time for frame in boxes] == [TIMES[0], TIMES[2]]
-    assert any("2 annotated frames have the names" in note and "1 others are not" in note for note in boxes.notes)
+    assert any("2 annotated frames" in note and "1 others" in note for note in boxes.notes)
 
 
 def test_coco_detections_are_found_by_number_and_keep_scores(tmp_path):
@@ -188,7 +188,7 @@ def test_cvat_images_are_found_by_name_and_turned_boxes_are_enclosed(tmp_path):
     np.testing.assert_allclose(
         (turned.left_px, turned.top_px, turned.right_px, turned.bottom_px), (109.5, 69.5, 129.5, 109.5)
     )
-    assert "1 shapes that are not boxes are left out" in boxes.notes
+    assert any(note.startswith("1 shapes") for note in boxes.notes)
 
 
 KITTI_3D = "1.8 0.5 1.2 1.0 1.6 9.0 0.1"
@@ -464,7 +464,7 @@ def test_frames_that_the_recording_lacks_are_left_out_and_counted(tmp_path):
     boxes = read(write(tmp_path, "instances.json", coco(names)))
 
     assert list(only_boxes(boxes)) == [0, 1, 2]
-    assert "1 of 4 annotated frames are not in the recording and are left out" in boxes.notes
+    assert any(note.startswith("1 of 4 annotated") for note in boxes.notes)
 
 
 # boxes-1 and labels-1: what is written comes back, and what is wrong is said with its place.

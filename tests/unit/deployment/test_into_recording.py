@@ -223,7 +223,7 @@ def test_an_export_of_an_export_adds_nothing_twice(ros, rows, write, tmp_path):
     first.write_bytes(exported(write(ros, without_info(rows(ros))), file).data)
     again = exported(first, file)
     assert not again.said.added
-    assert "state this pose of camera and radar already" in again.notes
+    assert "camera and radar already" in again.notes
 
 
 def test_returns_that_viewers_cannot_draw_are_also_a_cloud(rows, write, tmp_path):
@@ -241,7 +241,7 @@ def test_returns_that_viewers_cannot_draw_are_also_a_cloud(rows, write, tmp_path
     ]
     path = write(ros, sorted([row for row in rows(ros) if row[0] != "/radar/points"] + scans, key=lambda row: row[1]))
     written = exported(path, calibration_file(RECORDED))
-    assert "viewers cannot draw /radar as points" in written.notes
+    assert "cannot draw /radar" in written.notes
     found = written.on("/cocalib/radar_points")
     with open_recording(path) as recording:
         expected = recording.radar_scans()

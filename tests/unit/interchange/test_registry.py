@@ -82,7 +82,7 @@ def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file, 
 
     assert notes("camera_optical") == []
     (note,) = notes("camera_color_optical_frame")
-    assert "publishes camera_color_optical_frame under its camera_link already" in note
+    assert "camera_color_optical_frame under its camera_link" in note
     assert "--tree" in note
 
 
@@ -119,4 +119,4 @@ def test_two_formats_do_not_write_one_file(with_k3, monkeypatch):
     written, refused = export_all(with_k3)
 
     assert "matrix" in written
-    assert [one.name for one in refused if "is that of another format" in one.reason] == ["matrix-twin"]
+    assert [one.name for one in refused if "of another format" in one.reason] == ["matrix-twin"]

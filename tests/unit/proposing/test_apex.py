@@ -158,7 +158,7 @@ def test_two_reflectors_within_reach_are_refused_by_name():
     image[:, 101:] = image[:, 83:182]
     answer = find_apex(image, np.array([101.0, 100.0]))
     assert isinstance(answer, NoApex)
-    assert answer.reason.startswith("two corners of three sheets, 18 px apart")
+    assert "18 px apart" in answer.reason
 
 
 def test_a_corner_larger_than_the_reflector_is_refused():
@@ -166,5 +166,5 @@ def test_a_corner_larger_than_the_reflector_is_refused():
     image = noisy_image(look, behind, rng)
     answer = find_apex(image, look.apex_px, size_px=15.0)
     assert isinstance(answer, NoApex)
-    assert "beyond a reflector of 15 px" in answer.reason
+    assert "reflector of 15 px" in answer.reason
     assert isinstance(find_apex(image, look.apex_px, size_px=180.0), Apex)

@@ -225,7 +225,7 @@ def test_equal_receive_times_are_not_preferred_to_sound_stamps(received_ns, ros,
         assert len(recording.image_times) == len(recording.radar_times) == 40
         assert recording.image_clock == recording.radar_clock == "header"
         (clocks,) = [topic.clocks for topic in recording.topics if topic.name == "/radar/points"]
-    assert clocks.reason.endswith("and the stamps are sound")
+    assert clocks.reason.endswith("stamps are sound")
 
 
 def test_a_recorders_clock_that_was_set_back_is_not_mistaken_for_stamps_out_of_order(ros1, write, plain, jpeg):
@@ -294,12 +294,12 @@ def test_islands_and_gaps_of_data_are_counted():
     assert found.islands == 3
     assert found.covered_s == pytest.approx(199.7, abs=0.01)
     assert Rhythm.of(times).rate_hz == pytest.approx(10.0), "nothing happens between islands, which is no slower rate"
-    assert "3 separate stretches of data, 3.3 minutes in total" in found.remarks
+    assert any(remark.startswith("3 separate stretches") for remark in found.remarks)
     (warning,) = about_clocks([found])
     assert warning.code == "islands"
     assert "up to 56.7 minutes" in warning.facts["message"]
     dropped = look(np.delete(SOUND_NS, np.s_[700:720]), np.delete(LONG_RECEIVE_NS, np.s_[700:720]))
-    assert dropped.remarks == ("1 gap, the longest 2.100 s",)
+    assert [remark.split(" ")[-2] for remark in dropped.remarks] == ["2.100"]
 
 
 def test_stretches_that_both_sensors_have_are_one_warning():
@@ -314,17 +314,17 @@ def test_stretches_that_both_sensors_have_are_one_warning():
 
 
 def test_the_reason_for_the_clock_is_given():
-    assert look(np.zeros(2000), chosen="receive").reason == "it has only zero stamps (2000 messages)"
+    assert "zero stamps (2000 messages)" in look(np.zeros(2000), chosen="receive").reason
     assert look(None, chosen="receive", times_ns=LONG_RECEIVE_NS).reason == "it has no stamps"
     assert look(SOUND_NS, chosen="receive", requested="receive").reason == "--clock receive was given"
     assert "cannot be compared" in look(SOUND_NS, chosen="receive").reason
-    assert "both sensors use the same clock" in look(SOUND_NS - START_NS).reason
-    assert "jump or drift relative to the receive times" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
+    assert "the same clock" in look(SOUND_NS - START_NS).reason
+    assert "jump or drift" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
 
 
 def test_a_driver_that_stamps_every_return_is_recognised():
     found = look(SOUND_NS, one_per_return=True)
-    assert found.remarks == ("one message per return: stamps differ within a scan",)
+    assert [remark.split(":")[0] for remark in found.remarks] == ["one message per return"]
 
 
 @given(st.lists(st.integers(-(2**62), 2**62), max_size=80), st.sampled_from(["header", "receive"]))
@@ -342,10 +342,9 @@ def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, 
         text = describe(recording)
         (rear,) = [topic for topic in recording_summary(recording).topics if topic.name == "/rear/points"]
     assert (rear.chosen, rear.clocks.chosen, rear.clocks.zero_stamps) == (False, "receive", 10)
-    assert (
-        "/rear/points: not in use; times are the recorder's receive times, because it has only zero stamps (10 messages)"
-        in text
-    )
+    (line,) = (line for line in text.splitlines() if "/rear/points: not in use" in line)
+    assert "receive times" in line
+    assert "zero stamps (10 messages)" in line
 
 
 def test_the_warnings_of_the_clocks_reach_the_recording(ros1, write, plain, jpeg):

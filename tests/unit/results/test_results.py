@@ -59,14 +59,12 @@ def test_a_calibration_prints_as_nine_lines(simulated, method):
 
 def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar():
     text = str(
-        Unsolvable.reported(
-            "too-few-pairs", "2 of 4 pairs", "add two", (Unpaired.reported("c3", "no-scan", "no scan", "wait"),)
-        )
+        Unsolvable.reported("too-few-pairs", "2", "add two", (Unpaired.reported("c3", "no-scan", "lost", "wait"),))
     )
     assert text.splitlines() == [
-        "No calibration (too-few-pairs): 2 of 4 pairs",
+        "No calibration (too-few-pairs): 2",
         "  add two",
-        "  click c3: no scan; wait",
+        "  click c3: lost; wait",
     ]
 
 

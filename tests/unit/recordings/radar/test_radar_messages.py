@@ -151,7 +151,7 @@ def test_an_inconsistent_cloud_counts_as_empty_with_a_warning(ros, write, cloud_
         assert np.diff(scans.first_return).tolist() == [3, 3, 0]
         (warning,) = recording.warnings
         assert warning.code == "unreadable-messages"
-        assert "the first is number 1" in warning.facts["message"]
+        assert "is number 1" in warning.facts["message"]
 
 
 # -- lists
