@@ -431,7 +431,8 @@ def open_recording(
     Raises:
         RecordingError: it cannot be opened, or lacks what is required.
     """
-    chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
+    given = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    chosen = tuple(path if path.name else path.absolute() for path in given)
     options, file = with_recording_file(require_files(chosen), options or RecordingOptions())
     streams, rest, taken = open_uart_streams(chosen, options.radar_start)
     sources: tuple[Source, ...] = streams

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from calib_core import input_files
@@ -95,6 +97,34 @@ def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
     path.write_text(outside.format(opening * depth + closing * depth))
     for command in (("check", path), ("import", path, "--out", tmp_path / "c.json")):
         assert "deep" in one_line(cocalib(*command))
+
+
+@pytest.mark.parametrize("folder", ["/", ".", "./", "..", ""])
+@pytest.mark.parametrize("command", [["session", "list"], ["session", "repair"], ["batch"], ["solve", "--pairs"]])
+def test_a_folder_without_a_name_is_a_folder_like_any_other(cocalib, tmp_path, monkeypatch, command, folder):
+    monkeypatch.chdir(tmp_path)
+    answer = cocalib(*command, folder)
+    assert (answer.code, answer.out) == (0, "no sessions here or in your user folder\n") or one_line(answer)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows words it otherwise")
+def test_a_session_in_the_current_folder_is_not_moved_out_of_it(cocalib, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert ".: cannot be moved" in one_line(cocalib("demo", "--no-browser", "--session", ".", "--fresh"))
+
+
+@pytest.mark.parametrize("folder", [".", "./", "../images", "../images/."])
+def test_the_current_folder_is_read_like_a_named_one(cocalib, tmp_path, monkeypatch, folder):
+    images = tmp_path / "images"
+    images.mkdir()
+    for number in range(3):
+        cv2.imwrite(str(images / f"{number}.png"), np.zeros((48, 64, 3), np.uint8))
+    (tmp_path / "images.csv").write_text("file,time_ns\n0.png,1\n1.png,2\n2.png,3\n")
+    monkeypatch.chdir(images)
+    answer = cocalib("info", folder, "--json")
+    assert (answer.code, answer.err) == (0, "")
+    assert json.loads(answer.out)["topics"][0]["name"] == "/images/image"
+    assert "images.csv" in answer.out
 
 
 @POSIX

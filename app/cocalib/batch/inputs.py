@@ -127,13 +127,11 @@ def _within(folder: Path) -> Iterator[Path]:
 def _side_files(path: Path) -> Iterator[Path]:
     """Yield where `open_recording` looks for more than it was given: bag metadata, tables of times, published intrinsics."""
     yield recording_file_of(path)
-    stem = path.name if path.is_dir() else path.stem
-    yield from (path.parent / f"{stem}{suffix}" for suffix in (".csv", ".txt"))
+    for stem in {path.name, path.stem} if path.is_dir() else {path.stem}:
+        yield from (path.parent / f"{stem}{suffix}" for suffix in (".csv", ".txt"))
     if not path.is_dir():
         yield path.parent / "metadata.yaml"
         return
-    yield path.with_suffix(".csv")
-    yield path.with_suffix(".txt")
     yield path.parent / "timestamps.txt"
     yield path.parent / "calib.txt"
     yield from (path.parent / "calib").glob("*.txt")

@@ -174,7 +174,7 @@ def _names(given: Path) -> tuple[Path, ...]:
     """Return the names that a file of this name has: a ROS 1 recorder adds .active until the bag is closed."""
     if given.suffix == _ACTIVE:
         return given, given.with_suffix("")
-    return given, given.with_name(given.name + _ACTIVE)
+    return given, given.parent / f"{given.name}{_ACTIVE}"
 
 
 def _present(given: Path) -> Iterator[Path]:

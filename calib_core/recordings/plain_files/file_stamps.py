@@ -157,7 +157,7 @@ def stamp_files(
     files, options = sorted(files), options or PlainOptions()
     own = set(files)
     inside = (*sorted(folder.glob("*.csv")), *sorted(folder.glob("*.txt")))
-    beside = (folder.with_suffix(".csv"), folder.parent / "timestamps.txt", folder.with_suffix(".txt"))
+    beside = tuple(folder.parent / name for name in (f"{folder.stem}.csv", "timestamps.txt", f"{folder.stem}.txt"))
     for table in (path for path in (*inside, *beside) if path.is_file() and path not in own):
         times, zoneless = _from_table(table, files, options.zone_s)
         if times:

@@ -394,7 +394,7 @@ def _add_files(
     options: PlainOptions,
 ) -> None:
     """Add tables and videos; tables of times and calibrations belong to the folders beside them."""
-    of_folders = {folder.with_suffix(suffix) for folder in folders for suffix in (".csv", ".txt")}
+    of_folders = {folder.parent / f"{folder.stem}{suffix}" for folder in folders for suffix in (".csv", ".txt")}
     tables = [
         file
         for file in files

@@ -173,7 +173,7 @@ def recording_session_folder(paths: Sequence[Path]) -> Path:
         paths: the files or folders of the recording, at least one; the first names the session.
     """
     first = paths[0].resolve()
-    adjacent = first.with_name(first.name + SESSION_SUFFIX)
+    adjacent = first.parent / f"{first.name}{SESSION_SUFFIX}"  # also of /
     in_state_folder = user_session_folder(first.name, key=str(first))
     for folder in (adjacent, in_state_folder):
         if folder.is_dir() and is_writable(folder):

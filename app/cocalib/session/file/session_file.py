@@ -195,7 +195,7 @@ def set_aside(folder: Path) -> Path | None:
     finally:
         guarded.close()
     number = 1
-    while os.path.lexists(kept := folder.with_name(f"{folder.name}.{number}")):
+    while os.path.lexists(kept := folder.parent / f"{folder.name}.{number}"):
         number += 1
     try:
         folder.rename(kept)
