@@ -252,7 +252,9 @@ def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
     """Add the assumed noise to candidates of the paper's method, which has no noise model."""
     if all(np.isfinite(candidate.sigma_polar).all() for candidate in pair.candidates):
         return pair
-    return replace(pair, candidates=tuple(candidate_at(one.position_radar_m, options.noise) for one in pair.candidates))
+    return replace(
+        pair, candidates=tuple(candidate_at(candidate.position_radar_m, options.noise) for candidate in pair.candidates)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

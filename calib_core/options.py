@@ -299,9 +299,9 @@ LensChoice: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polyno
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:
     """Return the options of exact instruments: every prior of a systematic error 0, and no intrinsics to refine."""
-    radar = RadarOptions(**{one.name: 0.0 for one in fields(RadarOptions)})
-    lens = LensOptions(**{one.name: 0.0 for one in fields(LensOptions)})
-    reflector = ReflectorOptions(**{one.name: 0.0 for one in fields(ReflectorOptions)})
+    radar = RadarOptions(**{entry.name: 0.0 for entry in fields(RadarOptions)})
+    lens = LensOptions(**{entry.name: 0.0 for entry in fields(LensOptions)})
+    reflector = ReflectorOptions(**{entry.name: 0.0 for entry in fields(ReflectorOptions)})
     return replace(options, radar=radar, lens=lens, reflector=reflector, refining=RefiningOptions())
 
 
@@ -414,9 +414,9 @@ def option_fields() -> Mapping[str, OptionField]:
             leaves[top_field.name] = OptionField(top_field.name, CalibrationOptions, top_field, group)
             continue
         hints = typing.get_type_hints(group)
-        for one in fields(group):
-            path = f"{top_field.name}.{one.name}"
-            leaves[path] = OptionField(path, typing.cast(type, group), one, hints[one.name])
+        for entry in fields(group):
+            path = f"{top_field.name}.{entry.name}"
+            leaves[path] = OptionField(path, typing.cast(type, group), entry, hints[entry.name])
     return leaves
 
 

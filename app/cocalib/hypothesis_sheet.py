@@ -134,7 +134,10 @@ def _seen(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple
 
 def contact_sheet(frame: FrameWithReturns, hypotheses: Sequence["Hypothesis"]) -> np.ndarray:
     """Draw each hypothesis over the frame, with its number, its score and what it means; uint8 (h, w, 3)."""
-    tiles = [np.vstack([_caption(frame, number, one), tile(frame, one)]) for number, one in enumerate(hypotheses, 1)]
+    tiles = [
+        np.vstack([_caption(frame, number, hypothesis), tile(frame, hypothesis)])
+        for number, hypothesis in enumerate(hypotheses, 1)
+    ]
     blank = np.full_like(tiles[0], _PAPER[0])
     tiles += [blank] * (-len(tiles) % min(_ACROSS, len(tiles)))
     rows = [tiles[at : at + _ACROSS] for at in range(0, len(tiles), _ACROSS)]

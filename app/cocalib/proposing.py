@@ -127,7 +127,7 @@ def looks_of(
         frames: of the camera.
         camera: the intrinsics.
     """
-    found: list[Look] = []
+    looks: list[Look] = []
     for click in clicks:
         pixel_px = np.array([click.u_px, click.v_px])
         view = view_at(click.image_time, pixel_px, views)
@@ -136,13 +136,13 @@ def looks_of(
         others = [one for one in _meanwhile(click.image_time, views) if one is not view and has_changed(one, pixel_px)]
         shown = [look for one in (view, *others) if (look := look_of(one, frames, pixel_px)) is not None]
         if len({round(float(np.log(look.larger)), 1) for look in shown}) < 2:
-            found += shown[:1]
-        elif found:
-            found.append(min(shown, key=lambda look: abs(np.log(look.larger / found[0].larger))))
+            looks += shown[:1]
+        elif looks:
+            looks.append(min(shown, key=lambda look: abs(np.log(look.larger / looks[0].larger))))
         else:
             elsewhere = [one for one in views if not one.placement.start <= click.image_time <= one.placement.end]
-            found.append(max(shown, key=lambda look: likeness_elsewhere(look, elsewhere, frames, camera)))
-    return found
+            looks.append(max(shown, key=lambda look: likeness_elsewhere(look, elsewhere, frames, camera)))
+    return looks
 
 
 def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -> DwellView | None:
@@ -159,31 +159,31 @@ def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -
 
 
 def _meanwhile(image_time: TimeNs, views: Sequence[DwellView]) -> list[DwellView]:
-    return [one for one in views if one.placement.start <= image_time <= one.placement.end and len(one.frames)]
+    return [view for view in views if view.placement.start <= image_time <= view.placement.end and len(view.frames)]
 
 
 def beside_the_reflector(click: ReflectorClick, views: Sequence[DwellView]) -> float | None:
     """Return how far a click is from the nearest place that changed [px], if a reflector is seen there; None if it is on it."""
     pixel_px = np.array([click.u_px, click.v_px])
     view = view_at(click.image_time, pixel_px, views)
-    if view is None or not any(one.has_apex for one in view.candidates):
+    if view is None or not any(candidate.has_apex for candidate in view.candidates):
         return None
     off_px = _distance_px(view, pixel_px)
     return off_px if off_px > _BESIDE * view.width_px else None
 
 
 def _distance_px(view: DwellView, pixel_px: np.ndarray) -> float:
-    return min((float(np.linalg.norm(one.pixel_px - pixel_px)) for one in view.candidates), default=np.inf)
+    return min((float(np.linalg.norm(candidate.pixel_px - pixel_px)) for candidate in view.candidates), default=np.inf)
 
 
 def _placements(recording: RecordedFrames, gating: GatingOptions, stopped: Callable[[], bool]) -> tuple[Placement, ...]:
     """Search a whole recording, one stretch after another if it is long: memory stays bounded."""
     windows = takewhile(lambda _: not stopped(), recording.radar_windows())
     return tuple(
-        one
+        placement
         for stretch in in_stretches(static_returns(window, gating) for window in windows)
         if len(stretch) and stretch.times_ns[-1] - stretch.times_ns[0] >= _SHORTEST_NS
-        for one in find_placements(stretch, gating)
+        for placement in find_placements(stretch, gating)
     )
 
 
@@ -192,7 +192,10 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
     if len(placements) < _LEAST_PLACEMENTS:
         return Unsolvable("too-few-placements", {"placements": len(placements), "needed": _LEAST_PLACEMENTS})
     times = recording.image_times
-    seen = [np.searchsorted(times, one.start) < np.searchsorted(times, one.end, side="right") for one in placements]
+    seen = [
+        np.searchsorted(times, placement.start) < np.searchsorted(times, placement.end, side="right")
+        for placement in placements
+    ]
     if not any(seen):
         first_s, last_s = ((int(time) - int(placements[0].start)) / NS_PER_S for time in (times[0], times[-1]))
         span = {"first_s": first_s, "last_s": last_s}
@@ -430,8 +433,8 @@ class ProposingJob:
             return
         self._wait()
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
-        found = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
-        self._set(wish, found, tuple(views), **changes)
+        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
+        self._set(wish, proposals, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:
         """Whether looking at the images for this wish serves the newest one, too."""

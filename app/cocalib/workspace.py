@@ -339,7 +339,10 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         recording.radar_axes,
         recording.radar_times,
         recording.radar_topics,
-        tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
+        tuple(
+            AssumedReading(assumption.words, assumption_hint(assumption.confirm))
+            for assumption in recording.assumptions
+        ),
     )
 
 

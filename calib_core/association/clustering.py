@@ -157,7 +157,7 @@ def nearest_cluster(clusters: Sequence[Cluster], position_radar_m: Vector3, *, s
         position_radar_m: in the radar frame.
         scale: (3,) one step of distance in range [m], u and w.
     """
-    ahead = [one for one in clusters if one.forward * position_radar_m[0] >= 0]
+    ahead = [cluster for cluster in clusters if cluster.forward * position_radar_m[0] >= 0]
     if not ahead:
         return None
     away = (np.array([one.centre for one in ahead]) - direction_cosines(position_radar_m[None])) / scale

@@ -33,7 +33,7 @@ def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
     rows, others = _common(pairs, owner, window_s)
     if not len(rows):
         return np.full(len(owner), -1, dtype=np.int64)
-    of = np.array([one.alternative_of for pair in pairs for one in pair.candidates], dtype=np.int64)
+    of = np.array([candidate.alternative_of for pair in pairs for candidate in pair.candidates], dtype=np.int64)
     alternatives = np.flatnonzero(of >= 0)
     _, firsts, sets = np.unique(
         np.stack([owner[alternatives], of[alternatives]], axis=1), axis=0, return_index=True, return_inverse=True
@@ -48,7 +48,7 @@ def _common(pairs: Sequence[Pair], owner: Indices, window_s: float) -> tuple[Ind
     times = np.array([pair.image_time or 0 for pair in pairs], dtype=np.int64)[owner]
     timed = np.flatnonzero(np.array([pair.image_time is not None for pair in pairs], dtype=np.bool_)[owner])
     places = direction_cosines(
-        np.array([one.position_radar_m for pair in pairs for one in pair.candidates]).reshape(-1, 3)
+        np.array([candidate.position_radar_m for pair in pairs for candidate in pair.candidates]).reshape(-1, 3)
     )
     steps = places / CLUSTER_SCALE
     order = timed[np.argsort(steps[timed, 0], kind="stable")]

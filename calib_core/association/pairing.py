@@ -105,7 +105,7 @@ def pair_clicks(
     unpaired = [*pairing.unpaired, *(one for one in every.unpaired if one.id in untouched)]
     rank = {click.id: place for place, click in enumerate(sorted(clicks))}
     return Pairing(
-        tuple(sorted(pairs, key=lambda one: rank[one.id])), tuple(sorted(unpaired, key=lambda one: rank[one.id]))
+        tuple(sorted(pairs, key=lambda pair: rank[pair.id])), tuple(sorted(unpaired, key=lambda one: rank[one.id]))
     )
 
 
@@ -377,8 +377,8 @@ def find_companion(pairs: Sequence[Pair]) -> Companion | None:
 
 def _offsets(candidates: Sequence[Candidate]) -> list[_Offset]:
     """Return the offsets between the best candidate and every other plausible one behind or in front of it."""
-    cosines = direction_cosines(np.array([one.position_radar_m for one in candidates]))
-    scores = np.array([one.score for one in candidates])
+    cosines = direction_cosines(np.array([candidate.position_radar_m for candidate in candidates]))
+    scores = np.array([candidate.score for candidate in candidates])
     best = int(np.argmax(scores))
     rows = []
     for k in np.flatnonzero(scores >= _LEAST_SCORE * scores[best]).tolist():
@@ -406,14 +406,14 @@ def balanced_pairs(pairs: Sequence[Pair]) -> tuple[Pair, ...]:
 
 def _balanced(candidates: tuple[Candidate, ...], near: int, far: int) -> tuple[Candidate, ...]:
     """Divide the scores of two candidates between them; the alternatives of each share what it gets as before."""
-    alternatives = alternative_rows([one.alternative_of for one in candidates])
+    alternatives = alternative_rows([candidate.alternative_of for candidate in candidates])
     both = sum(candidates[k].score for k in {*alternatives[near].tolist(), *alternatives[far].tolist()})
     scores: dict[int, float] = {}
     for k, share in ((far, 1.0 / (1.0 + _NEARER)), (near, _NEARER / (1.0 + _NEARER))):
         rows = alternatives[k].tolist()
         own = sum(candidates[row].score for row in rows)
         scores |= {row: both * share * candidates[row].score / own for row in rows}
-    balanced = [replace(one, score=scores.get(k, one.score)) for k, one in enumerate(candidates)]
+    balanced = [replace(candidate, score=scores.get(k, candidate.score)) for k, candidate in enumerate(candidates)]
     return tuple(sorted(balanced, key=lambda one: -one.score))
 
 

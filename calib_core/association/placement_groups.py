@@ -147,7 +147,7 @@ def _share_return(one: Pair, other: Pair) -> bool:
 
 def steps_of_sigma(candidates: Sequence[Candidate]) -> Points3:
     """Return the radar positions of candidates (n, 3) in steps of the scale of a cluster: range and direction cosines."""
-    return direction_cosines(np.array([one.position_radar_m for one in candidates])) / CLUSTER_SCALE
+    return direction_cosines(np.array([candidate.position_radar_m for candidate in candidates])) / CLUSTER_SCALE
 
 
 def _excess_noise(groups: Sequence[tuple[Points2, Values]]) -> float:
@@ -215,10 +215,12 @@ def _numbered_apart(clicks: Sequence[Pair]) -> list[Pair]:
     """Give the alternatives of different clicks different numbers."""
     apart, taken = [], 0
     for click in clicks:
-        of = [one.alternative_of for one in click.candidates]
+        of = [candidate.alternative_of for candidate in click.candidates]
         candidates = [
-            replace(one, alternative_of=one.alternative_of + taken) if one.alternative_of >= 0 else one
-            for one in click.candidates
+            replace(candidate, alternative_of=candidate.alternative_of + taken)
+            if candidate.alternative_of >= 0
+            else candidate
+            for candidate in click.candidates
         ]
         apart.append(replace(click, candidates=tuple(candidates)))
         taken += max(of) + 1
@@ -227,7 +229,7 @@ def _numbered_apart(clicks: Sequence[Pair]) -> list[Pair]:
 
 def _pooled_alternatives(pooled: Sequence[Sequence[Candidate]]) -> list[int]:
     """Number sets of copies of one return: equal numbers are alternatives according to at least one click."""
-    numbers = [{one.alternative_of for one in copies} - {-1} for copies in pooled]
+    numbers = [{copy.alternative_of for copy in copies} - {-1} for copies in pooled]
     linked = np.array([[bool(own & other) for other in numbers] for own in numbers])
     np.fill_diagonal(linked, val=False)
     return joined_labels(linked).tolist()
@@ -241,11 +243,11 @@ def _equal(some: Sequence[Candidate], others: Sequence[Candidate]) -> bool:
 
 
 def _averaged(copies: Sequence[Candidate], clicks: int) -> Candidate:
-    first, score = copies[0], min(sum(one.score for one in copies) / clicks, 1.0)
-    positions = np.array([one.position_radar_m for one in copies])
+    first, score = copies[0], min(sum(copy.score for copy in copies) / clicks, 1.0)
+    positions = np.array([copy.position_radar_m for copy in copies])
     if (positions == positions[0]).all():
         return replace(first, score=score)
-    position = np.average(positions, axis=0, weights=[one.scans for one in copies])
+    position = np.average(positions, axis=0, weights=[copy.scans for copy in copies])
     return replace(
         first,
         position_radar_m=position,

@@ -366,7 +366,7 @@ def _original(recording: Recording) -> _Original:
             mine = topic if len(topic.parts) == 1 else topic.take((topic.part == number).nonzero()[0])
             index = MessageIndex(mine.receive_ns, mine.chunk, mine.offset)
             found.rows[places[id(source)]][channel.id] = index
-    found.files = [_with_definitions(one) for one in found.files]
+    found.files = [_with_definitions(file) for file in found.files]
     return found
 
 

@@ -63,9 +63,9 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         decisive_pair,
     )
     wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
-    found = [warning for check in checks for warning in check(fit)]
-    found = [one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)]
-    return (*suspected, *_counted_up(found, fit.inliers))
+    warnings = [warning for check in checks for warning in check(fit)]
+    warnings = [warning for warning in warnings if not (wrong_pixels and warning.code in _FOLLOWS_FROM_PIXELS)]
+    return (*suspected, *_counted_up(warnings, fit.inliers))
 
 
 def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
@@ -100,7 +100,7 @@ def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
         error.name: variance**0.5 for error, variance in zip(shared.estimated, variances, strict=True) if error.of_radar
     }
     if fit.uncertainty.growth == 1.0:  # smooth errors of the radar would pass for these
-        by_fit |= {one.name: one.sigma for one in errors if one.name.startswith(("click_", "range_scale"))}
+        by_fit |= {error.name: error.sigma for error in errors if error.name.startswith(("click_", "range_scale"))}
     return systematic_error_warnings(
         errors, by_fit, flat=fit.measurements.flat, measured=fit.measurements.prior.measured
     )

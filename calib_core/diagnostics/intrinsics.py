@@ -84,7 +84,7 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
     if fit.options.refining.intrinsics and fit.measurements.camera.covariance is None:
         return []
     focal, radial, *angles = _score_tests(fit)
-    of_lens, of_angles = min(focal.chance, radial.chance), min(one.chance for one in angles)
+    of_lens, of_angles = min(focal.chance, radial.chance), min(angle.chance for angle in angles)
     turn = _turn_test(fit)
     if turn.chance < min(_TURN_LEVEL, of_lens, of_angles):
         return [_turned(fit, turn)]
@@ -228,7 +228,7 @@ def _turn_test(fit: SolvedFit) -> TurnTest:
     residual = np.concatenate([residual, priors])
     explained, _ = np.linalg.qr(np.concatenate([jacobian, prior_jacobian]))
     smooth = smooth_rows(refined, inliers, _SMOOTH_RAD).reshape(len(inliers), 2, -1)
-    nu, found = refined.degrees_of_freedom, TurnTest()
+    nu, test = refined.degrees_of_freedom, TurnTest()
     tried = np.linspace(_LEAST_PLACEMENTS, len(inliers) - _LEAST_PLACEMENTS, _MOST_SPLITS).round().astype(np.int64)
     splits = [k for k in np.unique(tried).tolist() if 0 < times[k - 1] < times[k]]
     for k in splits:
@@ -245,10 +245,10 @@ def _turn_test(fit: SolvedFit) -> TurnTest:
         shrink = left / (nu - 3.0) if nu > 4.0 else 1.0
         tested = float(((score @ axes) ** 2 / (shrink + _SMOOTH_VARIANCE * np.maximum(added, 0.0))).sum())
         chance = len(splits) * _chance(tested, nu, 3.0)
-        if chance < found.chance:
+        if chance < test.chance:
             angle_rad = float(np.linalg.norm(white.T @ score))
-            found = TurnTest(angle_rad, int(inliers[k - 1]), int(inliers[k]), chance)
-    return found
+            test = TurnTest(angle_rad, int(inliers[k - 1]), int(inliers[k]), chance)
+    return test
 
 
 _SCALES = ("azimuth_scale", "elevation_scale")
@@ -270,7 +270,7 @@ def lens_or_scale(fit: SolvedFit) -> list[DataWarning]:
     focal = _focal(fit)
     if focal is None or focal.sigma < _NOTABLE_FOCAL or focal.scale_share < _UNTOLD_SHARE:
         return []
-    scales = [one for one in fit.uncertainty.systematic_errors if one.name in _SCALES]
+    scales = [error for error in fit.uncertainty.systematic_errors if error.name in _SCALES]
     return [
         DataWarning(
             "lens-or-radar-scale",
@@ -284,7 +284,7 @@ def refined_too_far(fit: SolvedFit) -> list[DataWarning]:
     errors = fit.refined.measurements.errors
     if errors.refined.start == errors.refined.stop:
         return []
-    beyond = [one for one in fit.uncertainty.systematic_errors if one.of_lens and is_beyond_its_prior(one)]
+    beyond = [error for error in fit.uncertainty.systematic_errors if error.of_lens and is_beyond_its_prior(error)]
     if not beyond:
         return []
     return [DataWarning("intrinsics-suspected", {"refined_too_far": beyond})]

@@ -48,7 +48,9 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
         limits: where the reflector can go.
     """
     clicks = [
-        _as_chosen(one.measured, one.candidate) for one in calibration.pairs if one.inlier and one.measured is not None
+        _as_chosen(pair.measured, pair.candidate)
+        for pair in calibration.pairs
+        if pair.inlier and pair.measured is not None
     ]
     if not clicks or not np.isfinite(calibration.covariance).all():
         return None

@@ -20,17 +20,17 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
 
 def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
     """Name the pair without which the others, judged anew, agree on another pose."""
-    found = fit.beyond.pivotal
-    if found is None:
+    pair = fit.beyond.pivotal
+    if pair is None:
         return []
     return [
         DataWarning(
             "doubtful-pair",
             {
-                "pair": fit.ids[found.pair],
-                "camera_moves_cm": 100.0 * found.camera_move_m,
-                "sigmas": found.standard_deviations,
-                "switched": [fit.ids[i] for i in found.switched],
+                "pair": fit.ids[pair.pair],
+                "camera_moves_cm": 100.0 * pair.camera_move_m,
+                "sigmas": pair.standard_deviations,
+                "switched": [fit.ids[i] for i in pair.switched],
             },
         )
     ]

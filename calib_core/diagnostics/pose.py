@@ -133,14 +133,14 @@ def possible_poses(fit: SolvedFit) -> list[DataWarning]:
 
 def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
     """Name the outliers that agree among themselves on another pose."""
-    found = fit.beyond.agreeing
-    if found is None:
+    outliers = fit.beyond.agreeing
+    if outliers is None:
         return []
-    names = [fit.ids[i] for i in found.pairs]
-    pose = found.camera_from_radar
+    names = [fit.ids[i] for i in outliers.pairs]
+    pose = outliers.camera_from_radar
     if on_rig(fit, pose) and _is_as_likely(fit, pose):
-        return [DataWarning("two-poses", {**_away(found.difference), "agreeing": names, "pairs": len(fit.ids)})]
-    return [DataWarning("agreeing-outliers", {"ids": names, "in_time": _in_time(fit, found.pairs)})]
+        return [DataWarning("two-poses", {**_away(outliers.difference), "agreeing": names, "pairs": len(fit.ids)})]
+    return [DataWarning("agreeing-outliers", {"ids": names, "in_time": _in_time(fit, outliers.pairs)})]
 
 
 def _in_time(fit: SolvedFit, pairs: Indices) -> str:
@@ -162,13 +162,18 @@ def _away(error: Values) -> Facts:
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
     """Say that the pairs contradict the measured camera position, and that the pose hardly uses it."""
-    found = fit.best.position
-    if found is None or not found.contradicted:
+    position = fit.best.position
+    if position is None or not position.contradicted:
         return []
     return [
         DataWarning(
             "camera-position-contradicted",
-            {"away_cm": 100.0 * found.away_m, "sigmas": found.sigmas, "misread": found.misread, "unit": found.unit},
+            {
+                "away_cm": 100.0 * position.away_m,
+                "sigmas": position.sigmas,
+                "misread": position.misread,
+                "unit": position.unit,
+            },
         )
     ]
 

@@ -54,15 +54,15 @@ def mirror_gain(
     """
     mirrored = measurements.mirrored()
     starts = initial_poses(mirrored, most=_STARTS, rng=np.random.default_rng(seed))
-    found = solve_gnc(mirrored, starts, estimate_scale=estimate_scale)
-    if not found:
+    solutions = solve_gnc(mirrored, starts, estimate_scale=estimate_scale)
+    if not solutions:
         return -np.inf
-    if abs(best.cost - found[0].cost) > _DECISIVE_DIFFERENCE:
-        return best.cost - found[0].cost
+    if abs(best.cost - solutions[0].cost) > _DECISIVE_DIFFERENCE:
+        return best.cost - solutions[0].cost
     gain = -np.inf
     for coarse in (True, False):
         straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale, coarse=coarse)
-        other = fit_errors_in_variables(mirrored, found[0], estimate_scale=estimate_scale, coarse=coarse)
+        other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale, coarse=coarse)
         gain = _cost(straight) - _cost(other)
         if all(abs(gain - limit) > _COARSE_ERROR for limit in (NOT_MIRRORED_GAIN, MIRRORED_GAIN)):
             break
@@ -118,15 +118,15 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
     """Run GNC from several initial poses and fit errors in variables from the most likely solution."""
     estimate_scale = options.noise.estimate_scale
     most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE
-    found = _found(measurements, options, most=most)
-    if not found:
+    solutions = _found(measurements, options, most=most)
+    if not solutions:
         return degenerate(len(measurements))
     if measurements.prior.measured:
-        position, refined = weighed_position(measurements, found[0], estimate_scale=estimate_scale)
-        best = BestFit(refined, found, measurements, position)
+        position, refined = weighed_position(measurements, solutions[0], estimate_scale=estimate_scale)
+        best = BestFit(refined, solutions, measurements, position)
     else:
-        refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
-        best = BestFit(refined, found, measurements)
+        refined = fit_errors_in_variables(measurements, solutions[0], estimate_scale=estimate_scale)
+        best = BestFit(refined, solutions, measurements)
     inliers = int(refined.inliers.sum())
     if inliers < MIN_PAIRS:
         return disagreeing(inliers, len(measurements), mirrored=best.mirror_gain(options) > MIRRORED_GAIN)
@@ -138,9 +138,9 @@ def _found(measurements: PairMeasurements, options: CalibrationOptions, *, most:
     few, estimate_scale = _some_pairs(measurements), options.noise.estimate_scale
     rng = np.random.default_rng(options.solving.seed)
     starts = initial_poses(few, most=most, rng=rng)
-    found = solve_gnc(few, starts, estimate_scale=estimate_scale)
-    if not measurements.prior.measured or (found and _mostly_agreeing(few, found[0])):
-        return found
+    solutions = solve_gnc(few, starts, estimate_scale=estimate_scale)
+    if not measurements.prior.measured or (solutions and _mostly_agreeing(few, solutions[0])):
+        return solutions
     free = replace(few, prior=few.prior.weakened())
     return solve_gnc(few, (*starts, *initial_poses(free, most=_STARTS_FREE, rng=rng)), estimate_scale=estimate_scale)
 
@@ -171,10 +171,10 @@ def quick_fit(
         )
         if near.inliers.mean() >= _STILL_AGREEING_SHARE:
             return near
-    found = _found(measurements, options, most=_STARTS_QUICK)
-    if not found:
+    solutions = _found(measurements, options, most=_STARTS_QUICK)
+    if not solutions:
         return None
-    fit = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale, coarse=True)
+    fit = fit_errors_in_variables(measurements, solutions[0], estimate_scale=estimate_scale, coarse=True)
     return fit if fit.inliers.sum() >= MIN_PAIRS else None
 
 

@@ -166,12 +166,12 @@ def possible_poses(drawn: PosteriorSamples) -> tuple[PossiblePose, ...]:
         else:
             first.append(k)
             shares.append(float(weights[k]))
-    found = [
+    poses = [
         PossiblePose(drawn.posterior.poses(centres[k][None]).transform(0), share)
         for k, share in zip(first, shares, strict=True)
         if share >= _LEAST_PROBABILITY
     ]
-    return tuple(sorted(found, key=lambda one: -one.probability))
+    return tuple(sorted(poses, key=lambda pose: -pose.probability))
 
 
 def _owned(samples: WeightedSamples) -> Values:

@@ -132,7 +132,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     """
     errors = refined.measurements.errors
     variances = np.diag(covariance)[6:]
-    found = [
+    results = [
         SystematicErrorResult(
             error.name,
             float(errors.values[k]),
@@ -145,7 +145,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
         if not error.of_lens
     ]
     if not errors.widening:
-        return _with_refined_lens(_Shared(np.zeros((6, 6)), found), errors, covariance, np.zeros((len(plain), 0)))
+        return _with_refined_lens(_Shared(np.zeros((6, 6)), results), errors, covariance, np.zeros((len(plain), 0)))
     whitened = widening_rows(refined)
     jacobian, weights = refined.model.jacobian, refined.weights[:, None, None]
     mixed = (np.swapaxes(jacobian, 1, 2) @ (weights * whitened)).sum(axis=0)
@@ -153,7 +153,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     solved = np.linalg.solve(plain, mixed)
     moves = -solved[:6] * sigma
     values, sigmas = _suggested(refined, whitened, mixed, solved)
-    found += [
+    results += [
         SystematicErrorResult(error.name, values[k], sigmas[k], error.sigma, False, *_sums(moves[:, k] ** 2))
         for k, error in enumerate(errors.widening)
         if not error.of_lens
@@ -161,8 +161,8 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     lens = np.array([error.of_lens for error in errors.widening])
     if lens.any():
         known = _suggested_lens(refined, whitened[:, :, lens], mixed[:, lens], solved[:, lens])
-        found += _of_lens(errors.lens, *known, moves[:, lens], np.eye(int(lens.sum())), estimated=False)
-    return _with_refined_lens(_Shared(np.asarray(moves @ moves.T), found), errors, covariance, solved * sigma)
+        results += _of_lens(errors.lens, *known, moves[:, lens], np.eye(int(lens.sum())), estimated=False)
+    return _with_refined_lens(_Shared(np.asarray(moves @ moves.T), results), errors, covariance, solved * sigma)
 
 
 def widening_rows(refined: ErrorsInVariablesFit) -> np.ndarray:
@@ -201,8 +201,8 @@ def _with_refined_lens(
     rows = slice(6 + places.start, 6 + places.stop)
     own = covariance[rows, rows]
     lens = own + widening[rows] @ widening[rows].T
-    found = _of_lens(errors.lens, errors.values[places], lens, covariance[:6, rows], own, estimated=True)
-    return _Shared(shared.pose, shared.found + found, lens)
+    results = _of_lens(errors.lens, errors.values[places], lens, covariance[:6, rows], own, estimated=True)
+    return _Shared(shared.pose, shared.found + results, lens)
 
 
 def _of_lens(

@@ -52,7 +52,7 @@ class _Poses:
 
     @classmethod
     def of(cls, poses: Sequence[RigidTransform]) -> "_Poses":
-        return cls(np.array([one.rotation for one in poses]), np.array([one.translation_m for one in poses]))
+        return cls(np.array([pose.rotation for pose in poses]), np.array([pose.translation_m for pose in poses]))
 
     def perturbed(self, steps: np.ndarray) -> "_Poses":
         return _Poses(rotation_exp(steps[:, 3:]) @ self.rotations, self.translations_m + steps[:, :3])
@@ -82,11 +82,11 @@ def solve_gnc(
     poses = _graduated(measurements, _Poses.of(starts))
     costs = _mixture_costs(measurements, poses, scales)
     best = costs.argmin(axis=1)
-    found = [
+    solutions = [
         GncSolution(pose, float(costs[i, k]), scales[k])
         for i, (pose, k) in enumerate(zip(poses.transforms(), best.tolist(), strict=True))
     ]
-    return tuple(sorted(found, key=lambda one: one.cost))
+    return tuple(sorted(solutions, key=lambda solution: solution.cost))
 
 
 def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:

@@ -240,14 +240,14 @@ def candidate_fits(calibration: Calibration, pair: Pair, candidates: Sequence[Ca
     """
     if not candidates:
         return ()
-    points = np.array([one.position_radar_m for one in candidates])
+    points = np.array([candidate.position_radar_m for candidate in candidates])
     projected = calibration.reproject(points)
     away = projected - pair.pixel_px
     covariances = _covariances(calibration, pair, candidates)
     with np.errstate(invalid="ignore"):
         squared = np.einsum("ni,nij,nj->n", away, np.linalg.pinv(np.nan_to_num(covariances)), away)
     squared[~np.isfinite(covariances).all(axis=(1, 2))] = np.nan
-    scores = np.array([one.score for one in candidates])
+    scores = np.array([candidate.score for candidate in candidates])
     probabilities = _probabilities(calibration, scores, squared, covariances)
     distances = np.linalg.norm(away, axis=1).tolist()
     rows = zip(projected, distances, squared.tolist(), probabilities.tolist(), strict=True)
@@ -258,8 +258,8 @@ def _covariances(calibration: Calibration, pair: Pair, candidates: Sequence[Cand
     """Return the covariance (n, 2, 2) [px^2] of click minus reprojection; NaN where it is not known."""
     noise = calibration.noise_scale
     sigma_px = calibration.options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px
-    reported = np.array([one.position_radar_m for one in candidates])
-    sigmas = np.array([one.sigma_polar for one in candidates]) * noise[1:]
+    reported = np.array([candidate.position_radar_m for candidate in candidates])
+    sigmas = np.array([candidate.sigma_polar for candidate in candidates]) * noise[1:]
     true_points = calibration.radar_errors.corrected(reported)
     camera_from_radar = calibration.camera_from_radar
     _, by_point = calibration.camera.project_with_jacobian(camera_from_radar @ true_points)

@@ -155,11 +155,11 @@ def pose_change(first: Calibration, second: Calibration, *, same_lens: bool, sam
     if _share_pairs(first, second):
         return "the two have pairs in common"
     sets = []
-    for one in (first, second):
-        fit = _refitted(one)
+    for calibration in (first, second):
+        fit = _refitted(calibration)
         if isinstance(fit, str):
             return fit
-        sets.append(_Equations.of(fit, one))
+        sets.append(_Equations.of(fit, calibration))
     known: dict[Owner, bool] = {"radar": True, "lens": same_lens, "person": same_person}
     return _joined(sets[0], sets[1], {owner for owner, same in known.items() if same})
 
@@ -273,7 +273,7 @@ def _joined(first: _Equations, second: _Equations, shared: Set[Owner]) -> PoseCh
     prior = np.zeros((size, size))
     prior[12:, 12:] = np.diag(np.array(sigmas) ** -2.0)
     rows = [one.rows @ spread[:, :size] for one, spread in zip((first, second), spreads, strict=True)]
-    noise = [one.T @ one for one in rows]
+    noise = [row.T @ row for row in rows]
     gradient = rows[0].T @ first.residual + rows[1].T @ second.residual
     for of_position, missed in _position_rows(first.fit, second.fit):
         prior[:12, :12] += of_position.T @ of_position

@@ -59,7 +59,10 @@ class Poses:
 
 def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
     """Stack poses."""
-    return Poses(np.array([one.rotation for one in transforms]), np.array([one.translation_m for one in transforms]))
+    return Poses(
+        np.array([transform.rotation for transform in transforms]),
+        np.array([transform.translation_m for transform in transforms]),
+    )
 
 
 def joined_poses(several: Sequence[Poses]) -> Poses:

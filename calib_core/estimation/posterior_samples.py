@@ -132,7 +132,7 @@ def importance_samples(
             break
         mixtures.append(_fitted(mixtures[-1], states, log_weights))
         new = mixtures[-1].draw(per_round, rng)
-        drawn = np.concatenate([drawn, np.stack([one.log_density(new) for one in mixtures[:-1]], axis=1)])
+        drawn = np.concatenate([drawn, np.stack([mixture.log_density(new) for mixture in mixtures[:-1]], axis=1)])
         states, found = np.concatenate([states, new]), np.concatenate([found, costs(new)])
         drawn = np.concatenate([drawn, mixtures[-1].log_density(states)[:, None]], axis=1)
         log_weights = -0.5 * found - np.logaddexp.reduce(drawn, axis=1)
@@ -340,7 +340,9 @@ def _likeliest(posterior: PosePosterior, peaks: _Peaks) -> _Peaks:
             break
         pose = peaks.poses.transform(k)
         errors = [pose.error_from(peaks.poses.transform(j)) for j in kept]
-        apart = [float(one @ np.linalg.solve(peaks.covariances[j], one)) for j, one in zip(kept, errors, strict=True)]
+        apart = [
+            float(error @ np.linalg.solve(peaks.covariances[j], error)) for j, error in zip(kept, errors, strict=True)
+        ]
         if not any(one < _SAME for one in apart):
             kept.append(k)
     return peaks.some(kept)

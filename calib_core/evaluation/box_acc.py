@@ -219,7 +219,7 @@ def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -
     """Return the mean Acc of the calibration turned by 10 deg to the left and to the right."""
     yaw = np.array(AXES["yaw"])
     pixels = [seen_pixels(_turned(points_camera_m, yaw, side * _CHANCE_DEG), camera) for side in (-1.0, 1.0)]
-    return float(np.mean([_mean_share(inside_own_boxes(one, counted.boxes_px), counted.frames) for one in pixels]))
+    return float(np.mean([_mean_share(inside_own_boxes(pixel, counted.boxes_px), counted.frames) for pixel in pixels]))
 
 
 def _area_chance(counted: CountedReturns, camera: Camera) -> float:

@@ -345,14 +345,14 @@ def tracked_sightings(targets: Sequence[TargetTrack], scans_of_frames: Indices) 
         scans_of_frames: (f,) the scan of each frame; -1 for none.
     """
     none = np.zeros(0, dtype=np.int64)
-    scans = np.concatenate([none, *(one.scan_of_row for one in targets)])
-    owner = np.repeat(np.arange(len(targets)), [len(one.rows) for one in targets])
-    points = np.concatenate([np.zeros((0, 3)), *(one.points_radar_m for one in targets)])
+    scans = np.concatenate([none, *(target.scan_of_row for target in targets)])
+    owner = np.repeat(np.arange(len(targets)), [len(target.rows) for target in targets])
+    points = np.concatenate([np.zeros((0, 3)), *(target.points_radar_m for target in targets)])
     order = np.argsort(scans, kind="stable")
     low, high = (np.searchsorted(scans[order], scans_of_frames, side=side) for side in ("left", "right"))
     frames, places = _spans(low, np.where(scans_of_frames >= 0, high, low))
     rows = order[places]
-    return _sightings(tuple(one.id for one in targets), frames, owner[rows], points[rows])
+    return _sightings(tuple(target.id for target in targets), frames, owner[rows], points[rows])
 
 
 def _spans(low: Indices, high: Indices) -> tuple[Indices, Indices]:
@@ -649,10 +649,10 @@ def returns_in_cuboids(
     names = [""] * (int(table.tracks.max()) + 1)
     for box in np.unique(boxes).tolist():
         names[table.tracks[box]] = table.names[box] or f"{table.labels[box] or 'object'}-{table.tracks[box]}"
-    found = _sightings(tuple(names), frames[rows], table.tracks[boxes], points[rows])
+    sightings = _sightings(tuple(names), frames[rows], table.tracks[boxes], points[rows])
     key = len(names) * frames[rows] + table.tracks[boxes]
     of_sighting = boxes[np.unique(key, return_index=True)[1]]
-    return found, Matches(
+    return sightings, Matches(
         of_sighting, np.ones(len(of_sighting), dtype=np.bool_), Bearings(float(place[0]), float(place[2]))
     )
 

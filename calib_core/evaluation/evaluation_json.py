@@ -121,14 +121,14 @@ def _boxes(figures: BoxFigures) -> dict[str, Any]:
         ],
         "frames": [
             {
-                "image_time": _time(one.image_time),
-                "radar_time": _time(one.radar_time),
-                "returns": one.returns,
-                "inside": one.inside,
-                "boxes": one.boxes,
-                "range_m": one.range_m,
+                "image_time": _time(frame.image_time),
+                "radar_time": _time(frame.radar_time),
+                "returns": frame.returns,
+                "inside": frame.inside,
+                "boxes": frame.boxes,
+                "range_m": frame.range_m,
             }
-            for one in figures.frames
+            for frame in figures.frames
         ],
         "rule": figures.rule,
         "source": figures.source,

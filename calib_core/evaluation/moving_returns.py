@@ -114,9 +114,11 @@ def moving_returns(windows: Iterable[RadarScans], options: TargetOptions) -> Mov
     searched = sum(piece.searched for piece in pieces)
     if sum(piece.unknown for piece in pieces) > _UNKNOWN_SHARE * searched:
         return MovingReturns(scans, rows, np.full(len(rows), np.nan), False, False, searched, _without_doppler(options))
-    fitted, unfitted, judged = (sum(getattr(one, name) for one in pieces) for name in ("fitted", "unfitted", "judged"))
+    fitted, unfitted, judged = (
+        sum(getattr(piece, name) for piece in pieces) for name in ("fitted", "unfitted", "judged")
+    )
     moved = options.sensors == "moving" or (options.sensors == "auto" and fitted > _MOVING_SHARE * max(judged, 1))
-    speeds = np.concatenate([np.zeros(0), *(one.as_moving if moved else one.as_still for one in pieces)])
+    speeds = np.concatenate([np.zeros(0), *(piece.as_moving if moved else piece.as_still for piece in pieces)])
     kept = np.flatnonzero(np.abs(np.nan_to_num(speeds)) >= options.min_speed_mps)
     warnings = _unclear(unfitted, judged) if options.sensors == "auto" and not moved else ()
     return MovingReturns(scans.take(kept), rows[kept], speeds[kept], True, moved, searched, warnings)

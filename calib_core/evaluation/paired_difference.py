@@ -63,7 +63,7 @@ def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
         a: of one calibration.
         b: of another, from the same returns and boxes.
     """
-    both = [(one, other) for one, other in zip(a.frames, b.frames, strict=True) if one.returns]
+    both = [(frame, other) for frame, other in zip(a.frames, b.frames, strict=True) if frame.returns]
     if not both:
         return None
     differences: Values = np.array([other.share - one.share for one, other in both])

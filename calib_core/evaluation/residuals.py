@@ -136,7 +136,7 @@ def _under(found: AssociatedPairs, calibration: Calibration) -> tuple[tuple[Pair
     """Return the pairs with one candidate each, and its positions (n, 3); of several, the one reprojected nearest."""
     single = []
     for pair in found.pairs:
-        positions = np.array([one.position_radar_m for one in pair.candidates])
+        positions = np.array([candidate.position_radar_m for candidate in pair.candidates])
         away_px = np.linalg.norm(calibration.reproject(positions) - pair.pixel_px, axis=1)
         nearest = int(np.argmin(np.where(np.isfinite(away_px), away_px, np.inf)))
         single.append(replace(pair, candidates=(pair.candidates[nearest],)))
@@ -205,7 +205,7 @@ def held_out(
 
 
 def _distance_px(pair: Pair, calibration: Calibration) -> float:
-    positions = np.array([one.position_radar_m for one in pair.candidates])
+    positions = np.array([candidate.position_radar_m for candidate in pair.candidates])
     away_px = np.linalg.norm(calibration.reproject(positions) - pair.pixel_px, axis=1)
     return float(away_px[0] if len(away_px) == 1 or np.isnan(away_px).all() else np.nanmin(away_px))
 
@@ -253,7 +253,7 @@ def residual_test(pairs: Sequence[Pair], calibration: Calibration) -> ResidualTe
     camera = replace(calibration.camera, covariance=None)
     measurements = pair_measurements(corrected, camera, options).scaled(calibration.noise_scale)
     rows, model = associate(measurements, calibration.camera_from_radar)
-    points_radar_m = np.array([one.position_radar_m for pair in corrected for one in pair.candidates])[rows]
+    points_radar_m = np.array([candidate.position_radar_m for pair in corrected for candidate in pair.candidates])[rows]
     residuals_px = calibration.camera.project(calibration.camera_from_radar @ points_radar_m) - measurements.pixels_px
     seen = np.isfinite(residuals_px).all(axis=1)
     distances_px = np.where(seen, np.linalg.norm(residuals_px, axis=1), np.inf)

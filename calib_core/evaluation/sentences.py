@@ -21,7 +21,7 @@ def evaluation_lines(evaluation: Evaluation) -> tuple[str, ...]:
         rows += _residual_lines(evaluation.residuals)
     if evaluation.boxes is not None:
         rows += _box_lines(evaluation.boxes)
-    rows += [f"warning: {said_of(one)}" for one in evaluation.warnings]
+    rows += [f"warning: {said_of(warning)}" for warning in evaluation.warnings]
     return tuple(rows)
 
 

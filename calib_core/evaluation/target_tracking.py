@@ -297,7 +297,7 @@ def _assign(alive: list[_Target], rows: Indices, clusters: TargetClusters, time_
 
 def _merged(target: _Target, rivals: list[_Target], time_ns: int) -> bool:
     """Return whether targets become one cluster here: afterwards nobody can say which one is which, so they end."""
-    known = [one for one in rivals if len(one.clusters) >= _LEAST_SIGHTINGS]
+    known = [rival for rival in rivals if len(rival.clusters) >= _LEAST_SIGHTINGS]
     recent = any(time_ns - one.seen_ns <= _MERGE_S * NS_PER_S for one in known)
     return recent and len(target.clusters) >= _LEAST_SIGHTINGS
 

@@ -111,14 +111,14 @@ def _files_at(path: Path) -> tuple[Path, ...]:
     for name in _OF_FOLDERS:
         if (path / name).is_file():
             return (path / name,)
-    found = sorted(_named_in(path, _DEPTH))
-    if not found:
+    paths = sorted(_named_in(path, _DEPTH))
+    if not paths:
         raise InputError(
             f"{path}: no file of frames in this folder (looked for {', '.join(_OF_TREES)}); give the files themselves"
         )
-    if len(found) > _MOST_FILES:
-        raise InputError(f"{path}: {len(found)} files that may contain frames; give the folder of one vehicle")
-    return tuple(found)
+    if len(paths) > _MOST_FILES:
+        raise InputError(f"{path}: {len(paths)} files that may contain frames; give the folder of one vehicle")
+    return tuple(paths)
 
 
 def _named_in(folder: Path, depth: int) -> Iterator[Path]:

@@ -52,9 +52,9 @@ def try_shapes(fit: LensFit, stack: ViewStack, warps: BoardWarp) -> ShapeTest:
     unlikely = covariance.chances(state.amounts, first) < _CHANCE
     keep = np.full(len(warps), bool(unlikely[:_BENDS].any()))
     keep[_BENDS:] = unlikely[_BENDS:]
-    found = BoardWarp(tuple(np.array(warps.names)[keep]), warps.directions[keep])
+    warp = BoardWarp(tuple(np.array(warps.names)[keep]), warps.directions[keep])
     sigmas = np.sqrt(np.diag(covariance.matrix)[first:])
-    return ShapeTest(found, state.amounts, sigmas, state.camera.parameters - flat.camera.parameters)
+    return ShapeTest(warp, state.amounts, sigmas, state.camera.parameters - flat.camera.parameters)
 
 
 _LEAST_SHARE = 0.2

@@ -175,7 +175,7 @@ def find_apex(
     if not inside:
         return NoApex(_what_was_seen(proposals, reach_px))
     best, *others = inside
-    apart_px = max((float(np.hypot(*(one.pixel_px - best.pixel_px))) for one in _rivals(best, others)), default=0.0)
+    apart_px = max((float(np.hypot(*(rival.pixel_px - best.pixel_px))) for rival in _rivals(best, others)), default=0.0)
     if apart_px > 0.0:
         return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well", several=True)
     radius_px = best.factor * best.fit.radius_px
@@ -206,7 +206,7 @@ def _reduced(image: np.ndarray, near_px: Vector2, reach_px: float) -> dict[int, 
 
 def _proposals(levels: dict[int, _Reduced], near_px: Vector2, reach_px: float) -> list[_Proposal]:
     """Return the best places, best first, each at the size at which it scores most."""
-    every = [one for factor, radius_px in _PROPOSING for one in _peaks(levels[factor], near_px, reach_px, radius_px)]
+    every = [peak for factor, radius_px in _PROPOSING for peak in _peaks(levels[factor], near_px, reach_px, radius_px)]
     every.sort(key=lambda one: -one.score)
     chosen: list[_Proposal] = []
     for one in every:
@@ -615,11 +615,11 @@ def _divisions() -> _Divisions:
     widths = range(_NARROWEST, _WIDEST + 1)
     first = np.array(
         [
-            (start, start + one, start + one + two)
+            (start, start + width, start + width + two)
             for start in range(_WEDGES)
-            for one in widths
+            for width in widths
             for two in widths
-            if _WEDGES - one - two in widths and start + one + two < _WEDGES
+            if _WEDGES - width - two in widths and start + width + two < _WEDGES
         ]
     )
     return _Divisions(first, first * (2.0 * np.pi / _WEDGES))

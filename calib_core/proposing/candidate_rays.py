@@ -196,13 +196,13 @@ def _choices(
         if _within(click, view)
     ]
     share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
-    share *= 1.0 - min(sum(one.odds for one in clicks), _CLICK_IS_RIGHT)
+    share *= 1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT)
     found = []
     for one, odds in zip(view.candidates, _odds(view.candidates), strict=True):
         u_px, v_px = one.pixel_px.tolist()
         clicked = any(np.hypot(u_px - own.u_px, v_px - own.v_px) <= _CLICKED * view.width_px for own in clicks)
         found.append(_Choice(u_px, v_px, one.sigma_px, 0.0 if clicked else float(share * odds)))
-    return [*(replace(one, odds=one.odds / len(clicks)) for one in clicks), *found]
+    return [*(replace(click, odds=click.odds / len(clicks)) for click in clicks), *found]
 
 
 def _within(click: ReflectorClick, view: DwellView) -> bool:
@@ -213,9 +213,11 @@ def _odds(candidates: Sequence[ImageCandidate]) -> Values:
     """Return how probably each candidate is the reflector, by what the image shows (k,)."""
     if not candidates:
         return np.zeros(0)
-    strength = np.array([max(one.strength, 1e-6) for one in candidates])
-    likeness = np.array([one.likeness for one in candidates])
-    gains = _STRENGTH * np.log(strength / strength.max()) + _APEX * np.array([one.has_apex for one in candidates])
+    strength = np.array([max(candidate.strength, 1e-6) for candidate in candidates])
+    likeness = np.array([candidate.likeness for candidate in candidates])
+    gains = _STRENGTH * np.log(strength / strength.max()) + _APEX * np.array(
+        [candidate.has_apex for candidate in candidates]
+    )
     gains = np.append(gains + np.where(np.isfinite(likeness), _ALIKE * (likeness - _LIKE), 0.0), _NONE)
     weight = np.exp(gains - gains.max())
     return np.asarray(weight[:-1] / weight.sum())

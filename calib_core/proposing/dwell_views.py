@@ -168,7 +168,7 @@ def with_blobs(view: DwellView) -> DwellView:
     """Find the places of the reflector's width among the pixels that changed."""
     width_px = view.width_px / view.factor
     response = _response(view.change, view.change_without, width_px)
-    return replace(view, candidates=tuple(_full(one, view.factor) for one in blobs(response, width_px)))
+    return replace(view, candidates=tuple(_full(blob, view.factor) for blob in blobs(response, width_px)))
 
 
 def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
@@ -324,7 +324,7 @@ class _Usual:
     def changes_of(self, stills: Sequence[StillImage]) -> np.ndarray:
         """Return how far each pixel of stills lies from what is usual: (k, h, w) uint8, in levels of `_LEVELS_PER_SIGMA`."""
         changes = [np.minimum(self._change_of(still.image), np.float32(_MOST_SIGMAS)) for still in stills]
-        levels = [np.round(one * np.float32(_LEVELS_PER_SIGMA)).astype(np.uint8) for one in changes]
+        levels = [np.round(change * np.float32(_LEVELS_PER_SIGMA)).astype(np.uint8) for change in changes]
         return np.array(levels, dtype=np.uint8).reshape(len(stills), *self.median.shape[:2])
 
     def _change_of(self, image: np.ndarray) -> np.ndarray:
@@ -429,7 +429,7 @@ def averaged_over_dwell(view: DwellView, frames: FrameSource, clicked: int, pixe
     reach_px = max(_LEAST_REACH_PX, _REACH * view.width_px)
     shown = [(own, np.zeros(2)), *_alike(own, view, frames, clicked, pixel_px)]
     answers = [find_apex(one, pixel_px + shift, reach_px=reach_px, size_px=view.width_px) for one, shift in shown]
-    apexes = [one for one in answers if isinstance(one, Apex)]
+    apexes = [answer for answer in answers if isinstance(answer, Apex)]
     if not apexes or len(apexes) < _LEAST_SHARE * len(answers):
         return None
     return _mean(apexes)
@@ -462,10 +462,10 @@ def _alike(
 
 def _mean(apexes: list[Apex]) -> DwellAverage:
     """Average without what lies apart; what all frames have in common is not averaged away."""
-    pixels_px = np.stack([one.pixel_px for one in apexes])
+    pixels_px = np.stack([apex.pixel_px for apex in apexes])
     off_px = np.hypot(*(pixels_px - np.median(pixels_px, axis=0)).T)
     kept = off_px <= max(_APART_PX, _APART * float(np.median(off_px)))
-    sigma_px = float(np.median([one.sigma_px for one, good in zip(apexes, kept, strict=True) if good]))
+    sigma_px = float(np.median([apex.sigma_px for apex, good in zip(apexes, kept, strict=True) if good]))
     count = int(kept.sum())
     scatter_px2 = float(pixels_px[kept].var(axis=0, ddof=1).mean()) / count if count > 1 else 0.0
     return DwellAverage(pixels_px[kept].mean(axis=0), float(np.hypot(sigma_px, np.sqrt(scatter_px2))), count)

@@ -63,16 +63,16 @@ def blobs(response: np.ndarray, width_px: float, *, most: int = _MOST) -> tuple[
     """
     left = response.copy()
     reach = max(3, round(_APART * width_px))
-    found: list[ImageCandidate] = []
+    candidates: list[ImageCandidate] = []
     for _ in range(most):
         row, column = (int(v) for v in np.unravel_index(int(np.argmax(left)), left.shape))
         strength = float(left[row, column])
         if strength <= 0.0:
             break
         pixel_px = np.array([column, row], dtype=np.float64)
-        found.append(ImageCandidate(pixel_px, _BLOB_SIGMA * width_px, strength))
+        candidates.append(ImageCandidate(pixel_px, _BLOB_SIGMA * width_px, strength))
         left[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1] = -np.inf
-    return tuple(found)
+    return tuple(candidates)
 
 
 def surroundings_of(image: np.ndarray, pixel_px: Vector2, half_px: float) -> Surroundings:

@@ -114,7 +114,9 @@ def likeness_elsewhere(look: Look, views: Sequence[DwellView], frames: FrameSour
         camera: its intrinsics.
     """
     found = with_look([view for view in views if view.candidates], [look], frames, camera)
-    likeness = sorted((max((one.likeness for one in view.candidates), default=0.0) for view in found), reverse=True)
+    likeness = sorted(
+        (max((candidate.likeness for candidate in view.candidates), default=0.0) for view in found), reverse=True
+    )
     return float(np.mean(likeness[: (len(likeness) + 1) // 2])) if likeness else 0.0
 
 
@@ -127,7 +129,7 @@ def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, came
     near = sorted(looks, key=lambda look: _unlike_in_size(look, view.width_px))[:_LOOKS]
     rough = [(_best_match(one, near, view.width_px, _ROUGH_WIDTH_PX, 1.0), one) for one in seen]
     rough.sort(key=lambda pair: -pair[0].likeness)
-    found: list[ImageCandidate] = []
+    candidates: list[ImageCandidate] = []
     size_px = np.array([camera.width_px, camera.height_px])
     for place, (match, candidate) in enumerate(rough):
         moved = replace(candidate, likeness=match.likeness)
@@ -135,22 +137,27 @@ def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, came
             fine = _best_match(candidate, [match.look], view.width_px, _FINE_WIDTH_PX, _FINER)
             moved = _moved(candidate, fine, view.width_px)
         inside = bool(((moved.pixel_px > -0.5) & (moved.pixel_px < size_px - 0.5)).all())
-        if inside and all(np.hypot(*(moved.pixel_px - other.pixel_px)) > _APART * view.width_px for other in found):
-            found.append(moved)
-    strongest = max((one.strength for one in found), default=1.0)
-    found.sort(key=lambda one: -(one.likeness + _STRENGTH * one.strength / strongest + _APEX * one.has_apex))
-    return replace(view, candidates=tuple(found))
+        if inside and all(
+            np.hypot(*(moved.pixel_px - other.pixel_px)) > _APART * view.width_px for other in candidates
+        ):
+            candidates.append(moved)
+    strongest = max((one.strength for one in candidates), default=1.0)
+    candidates.sort(key=lambda one: -(one.likeness + _STRENGTH * one.strength / strongest + _APEX * one.has_apex))
+    return replace(view, candidates=tuple(candidates))
 
 
 def _with_surroundings(view: DwellView, frames: FrameSource) -> list[ImageCandidate]:
     """Return the candidates of which the image is known; frames are decoded only where it was not kept."""
-    if all(one.surroundings is not None for one in view.candidates):
+    if all(candidate.surroundings is not None for candidate in view.candidates):
         return list(view.candidates)
     image = full_image(view.clear if len(view.clear) else view.frames, frames)
     if image is None:
         return []
     whole = Surroundings(image, np.zeros(2))
-    return [one if one.surroundings is not None else replace(one, surroundings=whole) for one in view.candidates]
+    return [
+        candidate if candidate.surroundings is not None else replace(candidate, surroundings=whole)
+        for candidate in view.candidates
+    ]
 
 
 def _unlike_in_size(look: Look, width_px: float) -> float:

@@ -328,20 +328,20 @@ def rotation_consensus(rays: CandidateRays, prior: MountingPrior, *, most: int =
         most: how many to return.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
-    found: list[RoughPoses] = []
+    poseses: list[RoughPoses] = []
     for centre in prior.starts_m:
         rotations = _from_two_dwells(rays, prior, centre, np.random.default_rng(seed))
         scores = _rotation_scores(rays, prior, centre, rotations)
         kept = _best_apart(rotations, scores, most)
         centres = np.tile(centre, (len(kept), 1))
-        found.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
-    scores = np.concatenate([one.scores for one in found])
+        poseses.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
+    scores = np.concatenate([posese.scores for posese in poseses])
     order = np.argsort(-scores, kind="stable")[:most]
     return RoughPoses.of_rotations(
-        np.concatenate([one.rotations for one in found])[order],
-        np.concatenate([one.centres_radar_m for one in found])[order],
+        np.concatenate([posese.rotations for posese in poseses])[order],
+        np.concatenate([posese.centres_radar_m for posese in poseses])[order],
         scores[order],
-        sum(one.tried for one in found),
+        sum(posese.tried for posese in poseses),
     )
 
 

@@ -103,11 +103,11 @@ def named_proposals(
     """
     number = {_key(view.placement): count for count, view in enumerate(views, start=1)}
     named = []
-    for one in proposals.ranked:
-        name = f"p{number[_key(one.placement)]}"
+    for proposal in proposals.ranked:
+        name = f"p{number[_key(proposal.placement)]}"
         while name in taken:
             name += "-proposed"
-        named.append((name, one))
+        named.append((name, proposal))
     return tuple(named)
 
 
@@ -147,7 +147,7 @@ def _proposal(name: str, proposal: Proposal) -> ProposalDocument:
         proposal.confidence,
         proposal.reason,
         click,
-        [_candidate(one) for one in proposal.candidates],
+        [_candidate(candidate) for candidate in proposal.candidates],
     )
 
 

@@ -240,7 +240,9 @@ def _alike(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:
     alike = np.zeros(rays.odds.shape, dtype=np.bool_)
     for i, view in enumerate(views):
         first = int((rays.click[i] >= 0).sum())
-        alike[i, first : first + len(view.candidates)] = [np.isfinite(one.likeness) for one in view.candidates]
+        alike[i, first : first + len(view.candidates)] = [
+            np.isfinite(candidate.likeness) for candidate in view.candidates
+        ]
     return alike & (rays.odds > 0.0)
 
 

@@ -139,7 +139,7 @@ def still_images(
     """
     groups: dict[frozenset[int], list[int]] = {}
     for k, time in enumerate(image_times[seen.numbers].tolist()):
-        standing = frozenset(i for i, one in enumerate(placements) if one.start <= time <= one.end)
+        standing = frozenset(i for i, placement in enumerate(placements) if placement.start <= time <= placement.end)
         groups.setdefault(standing | {number}, []).append(k)
     least = min(_LEAST_FRAMES, max(map(len, groups.values()), default=0))
     return tuple(

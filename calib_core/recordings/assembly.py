@@ -206,9 +206,13 @@ def _assumptions(
 ) -> tuple[Assumption, ...]:
     """Return what the files of the topics in use and the radar's messages do not state."""
     names = {topic.name for topic in used.all}
-    stated = [one for source in sources for one in source.assumptions if one.topic in names]
+    stated = [assumption for source in sources for assumption in source.assumptions if assumption.topic in names]
     parts = radar.parts if radar else ()
-    found = (replace(one.assumption, topic=part.topic.name) for part in parts for one in part.layout.plan.assumptions)
+    found = (
+        replace(assumption.assumption, topic=part.topic.name)
+        for part in parts
+        for assumption in part.layout.plan.assumptions
+    )
     return (*stated, *dict.fromkeys(found))
 
 

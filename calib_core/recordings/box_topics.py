@@ -73,9 +73,9 @@ def box_layout(definition: Definition) -> BoxLayout | None:
     for field in definition.fields:
         if field.count is None or field.type not in definition.types or not stamp:
             continue
-        found = _struct_layout(definition, field, stamp)
-        if found is not None:
-            return found
+        layout = _struct_layout(definition, field, stamp)
+        if layout is not None:
+            return layout
     return None
 
 
@@ -91,7 +91,9 @@ def _struct_layout(definition: Definition, field: Field, stamp: str) -> BoxLayou
         return next((path for path in paths if _is_single(_field_at(definition, field.type, path))), "")
 
     def whole(choices: Sequence[tuple[str, ...]], kind: str = field.type) -> tuple[str, ...]:
-        return next((one for one in choices if all(_is_single(_field_at(definition, kind, path)) for path in one)), ())
+        return next(
+            (choice for choice in choices if all(_is_single(_field_at(definition, kind, path)) for path in choice)), ()
+        )
 
     edges, centre, size = whole(_EDGES), whole(_CENTRES), whole(_SIZES)
     if not edges and not (centre and size):

@@ -202,7 +202,7 @@ def without_certain_zone(
         radar: the radar stream, if any.
         images: the image stream, if any.
     """
-    zoneless = {one.topic for one in assumptions if one.key == "time-zone"}
+    zoneless = {assumption.topic for assumption in assumptions if assumption.key == "time-zone"}
     if radar is None or images is None or not zoneless:
         return assumptions
     of_radar = {part.topic.name for part in radar.parts} <= zoneless
@@ -210,7 +210,9 @@ def without_certain_zone(
         return assumptions
     local_ns, others_ns = (radar.times_ns, images.times_ns) if of_radar else (images.times_ns, radar.times_ns)
     met = [offset_s for offset_s, overlap_ns in _zone_overlaps(local_ns, others_ns).items() if overlap_ns >= 0]
-    return assumptions if met != [0] else tuple(one for one in assumptions if one.key != "time-zone")
+    return (
+        assumptions if met != [0] else tuple(assumption for assumption in assumptions if assumption.key != "time-zone")
+    )
 
 
 def _zone_between(local_ns: TimesNs, others_ns: TimesNs) -> int | None:

@@ -333,9 +333,9 @@ class Meaning:
 def spelt(spellings: Iterable[Spelling]) -> Mapping[frozenset[str], Spelling]:
     """Return spellings by the set of their words; of two with the same words, the first."""
     found: dict[frozenset[str], Spelling] = {}
-    for one in spellings:
-        words = frozenset(folded(one.words.split()))
-        found.setdefault(words - FILLERS or words, one)
+    for spelling in spellings:
+        words = frozenset(folded(spelling.words.split()))
+        found.setdefault(words - FILLERS or words, spelling)
     return found
 
 
@@ -358,11 +358,11 @@ def column_meaning(name: str) -> Meaning | None:
     A table may be about anything: dx may be the size of an object, and a second azimuth or a bare lat no radar's.
     """
     plain, words = {word.lower() for word in _PLAIN_WORD.findall(name)}, words_of(_ACCURACY.sub("_sigma_", name))
-    found = _meaning(words, _SPELT_IN_TABLES, TABLE_TYPE_PREFIXES)
-    if found is None or found.numbered or (found.sigma and found.quantity not in _WITH_SIGMA):
+    meaning = _meaning(words, _SPELT_IN_TABLES, TABLE_TYPE_PREFIXES)
+    if meaning is None or meaning.numbered or (meaning.sigma and meaning.quantity not in _WITH_SIGMA):
         return None
-    on_earth = not plain.isdisjoint(_ON_EARTH) or (found.bare and not plain.isdisjoint(_BARE))
-    return None if on_earth else found
+    on_earth = not plain.isdisjoint(_ON_EARTH) or (meaning.bare and not plain.isdisjoint(_BARE))
+    return None if on_earth else meaning
 
 
 def is_plain(name: str, meaning: Meaning) -> bool:
@@ -383,9 +383,9 @@ def _meaning(
     if not BLOCKERS.isdisjoint(words):
         return None
     for start in range(_prefixes(words, type_prefixes) + 1):
-        found = _with_unit(tuple(word for word in words[start:] if word not in FILLERS), known)
-        if found is not None:
-            return found
+        meaning = _with_unit(tuple(word for word in words[start:] if word not in FILLERS), known)
+        if meaning is not None:
+            return meaning
     return None
 
 
@@ -400,9 +400,9 @@ def _prefixes(words: tuple[str, ...], type_prefixes: Set[str]) -> int:
 def _with_unit(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling]) -> Meaning | None:
     for size in range(min(_MOST_WORDS_OF_A_UNIT, len(words) - 1), 0, -1):
         unit = unit_of_words(words[-size:])
-        found = _plain(words[:-size], known) if unit else None
-        if unit and found and dimension_of(found.quantity) == unit.dimension:
-            return replace(found, unit=unit)
+        meaning = _plain(words[:-size], known) if unit else None
+        if unit and meaning and dimension_of(meaning.quantity) == unit.dimension:
+            return replace(meaning, unit=unit)
     return _plain(words, known)
 
 

@@ -172,7 +172,9 @@ class Recording:
     @property
     def stated_assumptions(self) -> tuple[StatedAssumption, ...]:
         """Every assumption, with whether the user has confirmed it."""
-        return tuple(StatedAssumption(one, self._assembly.confirmed) for one in self._assembly.assumptions)
+        return tuple(
+            StatedAssumption(assumption, self._assembly.confirmed) for assumption in self._assembly.assumptions
+        )
 
     @property
     def column_map(self) -> tuple[str, ...]:
@@ -192,8 +194,8 @@ class Recording:
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
         """What the user must know, including unreadable messages and damage found so far."""
-        found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
-        return (*found, *self._unreadable(), *self._about_lost())
+        warnings = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
+        return (*warnings, *self._unreadable(), *self._about_lost())
 
     @property
     def damage(self) -> tuple[DataWarning, ...]:
@@ -213,9 +215,9 @@ class Recording:
                 )
 
     def _about_lost(self) -> Iterator[DataWarning]:
-        found = self.losses()
-        if found.lost:
-            yield lost_returns(found.lost, found.read, "the radar")
+        losses = self.losses()
+        if losses.lost:
+            yield lost_returns(losses.lost, losses.read, "the radar")
 
     def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
         """Count the radar's lost returns among the scans read so far.
@@ -259,7 +261,9 @@ class Recording:
     def other_image_times(self) -> Mapping[str, TimesNs]:
         """Return the stamps of the frames of each image topic that is not in use (m,), ascending; they are read here."""
         spare = {
-            one.name for one in self.topics if one.kind == "image" and not one.chosen and not one.problem and one.count
+            topic.name
+            for topic in self.topics
+            if topic.kind == "image" and not topic.chosen and not topic.problem and topic.count
         }
         topics = join_topics(self.sources, spare)[0]
         stamped = {both.topic.name: both for both in read_stamps([(topic, 12) for topic in topics]) if len(both.topic)}

@@ -295,8 +295,8 @@ def _named_radars(inventory: Inventory, requested: str | None) -> tuple[tuple[To
     names = [requested] if requested in known else [name.strip() for name in requested.split(",") if name.strip()]
     if len(names) == 1 and names[0] not in known and len(inventory.of_kind("radar")) > 1:
         return (), names[0]
-    found = [_chosen(inventory, "radar", name) for name in dict.fromkeys(names or [requested])]
-    return tuple(topic for topic in found if topic is not None), None
+    topics = [_chosen(inventory, "radar", name) for name in dict.fromkeys(names or [requested])]
+    return tuple(topic for topic in topics if topic is not None), None
 
 
 def unknown_radar(inventory: Inventory, name: str, sensors: Sequence[str]) -> RecordingError:

@@ -355,7 +355,7 @@ def summary_text(summary: RecordingSummary) -> str:
         *_labelled("camera", _camera_lines(summary.camera)),
         *_labelled("boxes", _boxes(summary.topics)),
     ]
-    confirmed = [one.assumption.text for one in summary.assumptions if one.confirmed]
+    confirmed = [assumption.assumption.text for assumption in summary.assumptions if assumption.confirmed]
     lines.extend(_labelled("confirmed", [f"{text}." for text in confirmed]))
     if summary.warnings:
         lines.append("")
@@ -517,10 +517,12 @@ def _topics_of(sensor: RadarSensor) -> str:
 
 def _readings(radar: RadarSummary) -> list[str]:
     """List what was taken for what, unless it is all as ROS or the registry defines it."""
-    if not any(one.why.startswith(("unit:", "--map", "only")) or one.unit == "not stated" for one in radar.columns):
+    if not any(
+        column.why.startswith(("unit:", "--map", "only")) or column.unit == "not stated" for column in radar.columns
+    ):
         return []
     rows = [("quantity", "read from", "unit", "grows", "known by")]
-    rows += [(one.quantity, one.column, one.unit, one.sign, one.why) for one in radar.columns]
+    rows += [(column.quantity, column.column, column.unit, column.sign, column.why) for column in radar.columns]
     return list(_columns(rows))
 
 
@@ -542,7 +544,7 @@ def _camera_lines(camera: CameraSummary | None) -> list[str]:
 
 def _boxes(topics: Sequence[TopicSummary]) -> list[str]:
     """List the topics that can be given as --boxes."""
-    return [f"{one.name}: {one.layout}, {_counted(one.count, 'message')}" for one in topics if one.has_boxes]
+    return [f"{topic.name}: {topic.layout}, {_counted(topic.count, 'message')}" for topic in topics if topic.has_boxes]
 
 
 def _intrinsics(camera: CameraSummary) -> str:

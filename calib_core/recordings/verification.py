@@ -105,13 +105,15 @@ def verify_recording(
         progress: called with the amount done and the total, of each step.
     """
     topics = _Topics()
-    problems = {one.name: one.problem for one in recording.topics if one.problem and one.problem != "no messages"}
+    problems = {
+        topic.name: topic.problem for topic in recording.topics if topic.problem and topic.problem != "no messages"
+    }
     reading = _Reading(problems, decode_images, progress)
     for source in recording.sources:
         _read_source(source, topics, reading)
     warnings = recording.warnings
-    checks = tuple(sorted(topics.found.values(), key=lambda one: one.topic))
-    lost = any(one.damaged or one.undecodable for one in checks)
+    checks = tuple(sorted(topics.found.values(), key=lambda value: value.topic))
+    lost = any(check.damaged or check.undecodable for check in checks)
     sound = not lost and not any(warning.code in LOSSES for warning in warnings)
     return Verification(sound, files_of(recording), checks, tuple(map(warning_text, warnings)))
 
@@ -288,7 +290,7 @@ def verification_text(found: Verification) -> str:
 
 
 def _table(found: Verification) -> Iterator[str]:
-    rows = [("topic", *_COUNTS), *((one.topic, *map(str, _counts(one))) for one in found.topics)]
+    rows = [("topic", *_COUNTS), *((topic.topic, *map(str, _counts(topic))) for topic in found.topics)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for name, *counts in rows:
         cells = [count.rjust(width) for count, width in zip(counts, widths[1:], strict=True)]
@@ -300,9 +302,9 @@ def _counts(one: TopicCheck) -> tuple[int, ...]:
 
 
 def _faults(found: Verification) -> Iterator[str]:
-    for one in found.topics:
-        if one.fault:
-            yield f"  {one.topic}: {one.fault}"
+    for topic in found.topics:
+        if topic.fault:
+            yield f"  {topic.topic}: {topic.fault}"
 
 
 def _result(found: Verification) -> str:

@@ -33,7 +33,7 @@ from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.options import CalibrationOptions, RadarOptions
 from calib_core.radar import RadarErrors
 
-_RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
+_RADAR_ERRORS = {entry.name for entry in fields(RadarErrors)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -567,8 +567,8 @@ def rescaled(
 ) -> tuple[SystematicErrorResult, ...]:
     """Multiply the shares of the position's and of the rotation's variance, as when only a part of that variance is meant."""
     return tuple(
-        replace(one, position_share=position * one.position_share, rotation_share=rotation * one.rotation_share)
-        for one in errors
+        replace(error, position_share=position * error.position_share, rotation_share=rotation * error.rotation_share)
+        for error in errors
     )
 
 

@@ -40,8 +40,8 @@ def true_boxes(recording: SimulatedRecording) -> Boxes:
     frames = []
     for moment_s, stamp in zip(stage.frame_times.moment_s, stage.frame_times.header_ns, strict=True):
         actors = _actors(stage, float(moment_s))
-        found = [_box(stage, actor, actors, solids) for actor in actors]
-        frames.append(FrameBoxes(TimeNs(int(stamp)), tuple(box for box in found if box is not None)))
+        boxes = [_box(stage, actor, actors, solids) for actor in actors]
+        frames.append(FrameBoxes(TimeNs(int(stamp)), tuple(box for box in boxes if box is not None)))
     camera = recording.camera
     return Boxes(tuple(frames), "the simulation", (camera.width_px, camera.height_px))
 

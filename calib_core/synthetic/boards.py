@@ -369,16 +369,16 @@ def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: i
     outline = middle + (corners - middle) * (
         1.0 + 2.0 * _RIM_SQUARES * board.square_m / np.append(np.ptp(corners[:, :2], axis=0), 1.0)
     )
-    found: list[RigidTransform] = []
+    transforms: list[RigidTransform] = []
     for place in _spread(rng, count):
         drawn = (_drawn(rng, outline, middle, camera, place) for _ in range(_TRIES))
         pose = next((pose for pose in drawn if pose is not None), None)
         if pose is None:
             raise OptionError(
-                f"only {len(found)} of {count} poses of the waved board fit in the image; ask for a usual size of images"
+                f"only {len(transforms)} of {count} poses of the waved board fit in the image; ask for a usual size of images"
             )
-        found.append(pose)
-    return tuple(found)
+        transforms.append(pose)
+    return tuple(transforms)
 
 
 def _spread(rng: np.random.Generator, count: int) -> Points2:

@@ -45,7 +45,7 @@ def clicks_of(stage: Stage, placements: tuple[SimulatedPlacement, ...]) -> tuple
     intentions = _intentions(rng, stage, placements)
     if not intentions:
         return ()
-    first = min(intentions, key=lambda one: one.time)
+    first = min(intentions, key=lambda intention: intention.time)
     clicks = []
     for number, one in enumerate(intentions):
         placement = placements[one.index]

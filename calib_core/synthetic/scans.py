@@ -96,9 +96,9 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
     """List the objects in front of the radar at a time: clutter, reflectors and their ghosts, people's limbs."""
     story, moments_s = stage.story, (time_s - _STEP_S, time_s, time_s + _STEP_S)
     before, now, after = (story.at(moment_s) for moment_s in moments_s)
-    flickers = [one.scatterer for one in stage.flickers if one.shows(time_s)]
+    flickers = [flicker.scatterer for flicker in stage.flickers if flicker.shows(time_s)]
     echoes = [
-        _still([one.position_m for one in things], [one.rcs_dbsm for one in things], 2.0, bias)
+        _still([thing.position_m for thing in things], [thing.rcs_dbsm for thing in things], 2.0, bias)
         for things, bias in ((stage.clutter, stage.clutter_bias), (flickers, np.zeros((len(flickers), 3))))
     ]
     echoes += _reflector_echoes(stage, before, now, after)

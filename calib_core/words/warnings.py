@@ -585,7 +585,9 @@ def lens_or_radar_scale(*, change: float, sigma: float, scales: Sequence[Systema
     Could also be: a longer focal length and smaller angles of the radar: pairs show their sum. Measure the radar's scale,
     or calibrate the lens on a board.
     """
-    changed = ", ".join(f"{error_words(one.name).text} {percent(one.value, one.sigma, sign=True)}" for one in scales)
+    changed = ", ".join(
+        f"{error_words(scale.name).text} {percent(scale.value, scale.sigma, sign=True)}" for scale in scales
+    )
     return remark(
         "lens or radar scale, the data cannot tell: the focal length was changed by "
         f"{percent(change, sigma, sign=True)}, with {changed}; pairs show the sum of both, and only what was assumed before "

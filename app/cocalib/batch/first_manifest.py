@@ -51,17 +51,17 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give the one that has the recordings")
-    found = sorted(_sessions(folder), key=lambda one: (one.vehicle, one.session))
-    if not found:
+    rows = sorted(_sessions(folder), key=lambda session: (session.vehicle, session.session))
+    if not rows:
         raise InputError(
             f"{folder}: no recording in it: no file that ends in {', '.join(_SUFFIXES)}, and no bag folder; write the manifest "
             "yourself if the recordings are images and tables"
         )
     home = manifest.absolute().parent
-    left_out = list(_left_out(folder, found))
+    left_out = list(_left_out(folder, rows))
     if len(left_out) > _MOST_LEFT_OUT:
         left_out = [*left_out[:_MOST_LEFT_OUT], f"# and {len(left_out) - _MOST_LEFT_OUT} more folders"]
-    return "\n".join([_HEAD, *(_text(one, home) for one in found), *left_out, *[""] * bool(left_out)]), len(found)
+    return "\n".join([_HEAD, *(_text(row, home) for row in rows), *left_out, *[""] * bool(left_out)]), len(rows)
 
 
 def _left_out(folder: Path, found: Sequence[ManifestRow]) -> Iterator[str]:
@@ -145,7 +145,7 @@ def _text(found: ManifestRow, home: Path) -> str:
         f"clicks = {_quoted(_relative(clicks[0], home))}" if len(clicks) == 1 and alone else _NOT_CLICKED,
     ]
     if len(clicks) > 1 or (clicks and not alone):
-        lines.append(f"# files with clicks: {', '.join(_relative(one, home) for one in clicks)}")
+        lines.append(f"# files with clicks: {', '.join(_relative(click, home) for click in clicks)}")
     if camera is not None:
         lines.append(
             f"# camera = {_quoted(_relative(camera, home))}  # only where the recording has no intrinsics of its own"

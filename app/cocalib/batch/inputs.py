@@ -64,13 +64,13 @@ class InputPath:
         if self.role == "camera" and "#" in str(path) and not path.exists():  # FILE#CAMERA
             path = Path(str(path).rpartition("#")[0])
         path.stat()
-        found = list(_within(path)) if path.is_dir() else [path]
+        paths = list(_within(path)) if path.is_dir() else [path]
         if self.role == "recording":
-            found += [side for side in _side_files(path) if side not in found and side.is_file()]
-        for file in found:
+            paths += [side for side in _side_files(path) if side not in paths and side.is_file()]
+        for file in paths:
             if (kind := special_kind(file)) is not None:
                 raise OSError(errno.EINVAL, f"is {kind}, not a file", str(file))  # reading it may never end
-        named = {os.path.relpath(file, path.parent).replace(os.sep, "/"): file for file in found}
+        named = {os.path.relpath(file, path.parent).replace(os.sep, "/"): file for file in paths}
         return tuple(InputFile(name, named[name]) for name in sorted(named))
 
 
@@ -94,12 +94,12 @@ def all_reached(inputs: tuple[InputPath, ...]) -> bool:
 def state_of(inputs: tuple[InputPath, ...]) -> str:
     """Return a digest of the sizes and times of inputs; content that changes changes it. What is missing counts, too."""
     listed: list[object] = []
-    for one in inputs:
+    for path in inputs:
         try:
-            stats = [(file.name, file.path.stat()) for file in one.files()]
-            listed.append([one.role, [(name, stat.st_size, stat.st_mtime_ns) for name, stat in stats]])
+            stats = [(file.name, file.path.stat()) for file in path.files()]
+            listed.append([path.role, [(name, stat.st_size, stat.st_mtime_ns) for name, stat in stats]])
         except OSError:
-            listed.append([one.role, None])
+            listed.append([path.role, None])
     return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
 
 

@@ -137,7 +137,7 @@ def read_manifest(path: Path) -> Manifest:
         checked(_merged(defaults, one), SessionDocument, source=f"{path}: {place}")
         for one, place in zip(content["session"], places, strict=True)
     ]
-    rows = tuple(_row(one, place, path) for one, place in zip(sessions, places, strict=True))
+    rows = tuple(_row(session, place, path) for session, place in zip(sessions, places, strict=True))
     _require_different(rows, path)
     _require_own_recordings(rows, path)
     return Manifest(path, rows)

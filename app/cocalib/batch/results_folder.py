@@ -62,10 +62,10 @@ class ResultsFolder:
             CalibrationError: one of its files is no regular file, or a folder above it is a link; nothing was changed.
         """
         try:
-            found = read_outcome((self.read(RESULTS, digest, OUTCOME_FILE) or b"").decode())
-            if found.digest != digest or not found.is_final:
+            outcome = read_outcome((self.read(RESULTS, digest, OUTCOME_FILE) or b"").decode())
+            if outcome.digest != digest or not outcome.is_final:
                 return None
-            return found if all(self._sha256(digest, file.name) == file.sha256 for file in found.files) else None
+            return outcome if all(self._sha256(digest, file.name) == file.sha256 for file in outcome.files) else None
         except (OSError, ValueError, InputError):
             return None
 

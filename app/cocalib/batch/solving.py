@@ -98,8 +98,8 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
         clicks = clicks_in_recording(
             read_clicks_file(clicks_text, CLICKS_FILE).clicks, recording, camera, source=Path(CLICKS_FILE)
         ).clicks
-    found = imported(read_calibration(text, CALIBRATION_FILE))
-    return SolvedSession(outcome, found, clicks, files, tuple(notes))
+    calibration = imported(read_calibration(text, CALIBRATION_FILE))
+    return SolvedSession(outcome, calibration, clicks, files, tuple(notes))
 
 
 def _placed(

@@ -130,7 +130,7 @@ class Batch:
         print("\n".join(batch_lines(outcomes)))
         print(f"\nresults: {results.path / CSV_FILE}, {results.path / JSON_FILE}")
         print(f"as a table: cocalib batch status {results.path}")
-        return batch_exit_code([_level(one) for one in outcomes], self.require)
+        return batch_exit_code([_level(outcome) for outcome in outcomes], self.require)
 
 
 def _level(outcome: "Outcome") -> str | None:

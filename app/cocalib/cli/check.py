@@ -176,7 +176,8 @@ class Check:
         options = self.evidence.options()
         with self.topics.open(self.recording, ("radar",)) as recording:
             a, b = (
-                judged_calibration(self.frames.read([one])[0], one, recording, camera=evidence.camera) for one in paths
+                judged_calibration(self.frames.read([path])[0], path, recording, camera=evidence.camera)
+                for path in paths
             )
             clicks, boxes, labels = self.evidence.found_in(recording, self.recording, [a.found, b.found], "the two")
             with progress_bar("comparing") as progress:

@@ -99,7 +99,7 @@ class Evaluate:
         code = NO_ANSWER if self.judging.recording and evaluation is None else DONE
         code = code if evaluation is None else evaluation_exit_code(evaluation)
         code = code or exit_code(verdict.level if verdict else None, found.evidence, level)
-        code = code or (DONE if all(one.met for one in limits) else IN_DOUBT)
+        code = code or (DONE if all(limit.met for limit in limits) else IN_DOUBT)
         if evaluation is not None and self.json:
             names = [path.name for path in self.judging.recording]
             print_exactly(

@@ -153,8 +153,8 @@ def _write_all(
     write_all({folder / made.file_name: made.data for made in written.values()} | extra)
     for name, made in written.items():
         print(f"{name}: written to {folder / made.file_name}")
-    for one in refused:
-        print(f"{one.name}: not written: {one.reason}")
+    for exported in refused:
+        print(f"{exported.name}: not written: {exported.reason}")
     _print_warnings(file)
     for note in dict.fromkeys(note for made in written.values() for note in made.notes):
         names = ", ".join(name for name, made in written.items() if note in made.notes)

@@ -137,8 +137,8 @@ def _camera_in(file: "UnstatedFile") -> "Camera | None":
     Raises:
         InputError: a parameter is invalid.
     """
-    found = file.camera
-    return None if found is None or found.size_px is None else found.camera(image_size_px=None, source=file.source)
+    camera = file.camera
+    return None if camera is None or camera.size_px is None else camera.camera(image_size_px=None, source=file.source)
 
 
 def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
@@ -185,7 +185,7 @@ def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> 
 def _tell_of_others(hypotheses: "Sequence[Hypothesis]", *, tested: bool) -> None:
     """Print what was taken, and which other meanings are possible if nothing was tested."""
     print(f"note: taken as {hypotheses[0].key} ({hypotheses[0].score}): {hypotheses[0].words}", file=sys.stderr)
-    others = [] if tested else [one for one in hypotheses[1:4] if one.fits]
+    others = [] if tested else [hypothesis for hypothesis in hypotheses[1:4] if hypothesis.fits]
     if others:
         named = "; ".join(f"{one.key} ({one.score})" for one in others)
         print(f"note: less plausible, but possible: {named}; pick with --as MEANING", file=sys.stderr)

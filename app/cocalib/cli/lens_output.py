@@ -70,7 +70,7 @@ def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *,
     if verbose:
         yield from _view_lines(lens)
     yield from left_out_lines(lens.left_out, most=len(lens.left_out) if verbose else _MOST_LEFT_OUT)
-    yield from (f"warning: {in_sentences(one)} [{one.code}]" for one in lens.warnings)
+    yield from (f"warning: {in_sentences(warning)} [{warning.code}]" for warning in lens.warnings)
 
 
 def left_out_lines(left_out: Sequence[LeftOutImage], *, most: int = _MOST_LEFT_OUT) -> Iterator[str]:

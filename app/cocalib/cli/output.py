@@ -118,9 +118,9 @@ def told_clicks_at_frames(
     """
     from cocalib.session.click_stamps import clicks_at_frames
 
-    found = clicks_at_frames(clicks, recording.image_times, source=source, others=recording.other_image_times)
-    _tell_notes(found.notes)
-    return found.clicks
+    frames = clicks_at_frames(clicks, recording.image_times, source=source, others=recording.other_image_times)
+    _tell_notes(frames.notes)
+    return frames.clicks
 
 
 def recorded_clicks(
@@ -133,9 +133,9 @@ def recorded_clicks(
     """
     from cocalib.solving.recorded_clicks import clicks_in_recording
 
-    found = clicks_in_recording(clicks, recording, camera, source=source)
-    _tell_notes(found.notes)
-    return found.clicks
+    frames = clicks_in_recording(clicks, recording, camera, source=source)
+    _tell_notes(frames.notes)
+    return frames.clicks
 
 
 def tell_choices(recording: "Recording") -> None:

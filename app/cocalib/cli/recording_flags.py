@@ -205,10 +205,10 @@ class VehicleFlags:
         """
         from calib_core.interchange.calibration_file import VehicleNote, require_label, require_name
 
-        for one in fields(self):
-            if (text := getattr(self, one.name)) is not None:
-                require = require_name if one.name in ("vehicle", "session_name") else require_label
-                require(text, f"--{one.name.replace('_', '-')}")
+        for entry in fields(self):
+            if (text := getattr(self, entry.name)) is not None:
+                require = require_name if entry.name in ("vehicle", "session_name") else require_label
+                require(text, f"--{entry.name.replace('_', '-')}")
         return VehicleNote(self.vehicle, self.vehicle_type, self.session_name, self.radar_serial, self.camera_serial)
 
 

@@ -80,21 +80,23 @@ def compare_on_recording(
     Raises:
         InputError: the two are of cameras with different images, or boxes and recording do not belong together.
     """
-    sizes = [(one.camera.width_px, one.camera.height_px) for one in calibrations]
+    sizes = [(calibration.camera.width_px, calibration.camera.height_px) for calibration in calibrations]
     if sizes[0] != sizes[1]:
         raise InputError(
             f"{names[0]} is for images of {sizes[0][0]} x {sizes[0][1]} px, {names[1]} for {sizes[1][0]} x {sizes[1][1]} px; "
             "compare calibrations of one camera"
         )
     lens = calibrations[0].camera
-    found = evidence_in(recording, lens, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options)
-    a, b = (judged(one, found, held_out=False, progress=progress) for one in calibrations)
+    evidence = evidence_in(
+        recording, lens, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
+    )
+    a, b = (judged(calibration, evidence, held_out=False, progress=progress) for calibration in calibrations)
     residuals = acc = None
     if a.residuals is not None and b.residuals is not None:
         residuals = residual_difference(a.residuals, b.residuals, lost_px=float(np.hypot(*sizes[0])))
     if a.boxes is not None and b.boxes is not None:
         acc = acc_difference(a.boxes, b.boxes)
-    fitted_a, fitted_b = (_fitted(one, clicks) for one in calibrations)
+    fitted_a, fitted_b = (_fitted(calibration, clicks) for calibration in calibrations)
     return ComparedOnRecording(names, a, b, residuals, acc, (fitted_a, fitted_b))
 
 

@@ -105,10 +105,10 @@ def evaluate_recording(
     Raises:
         InputError: boxes or labels are of another recording or another camera, or no class matches.
     """
-    found = evidence_in(
+    evidence = evidence_in(
         recording, calibration.camera, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
     )
-    return judged(calibration, found, held_out=held_out, progress=progress)
+    return judged(calibration, evidence, held_out=held_out, progress=progress)
 
 
 def evidence_in(
@@ -151,10 +151,12 @@ def evidence_in(
         return Evidence(pairs, unpaired, returns, (*lost, *_about(returns)))
     if too_sparse := _too_sparse(recording.radar_times, boxes):
         return Evidence(pairs, unpaired, None, (*lost, *too_sparse))
-    found = find_targets(_windows(recording, boxes), options.targets, progress=progress)
-    stamps = RadarScans(found.moving.scans.times_ns, np.zeros(len(found.moving.scans) + 1, dtype=np.int64))
-    returns = counted_returns(camera, stamps, boxes, found.tracks, classes=options.classes, max_gap_s=options.max_gap_s)
-    return Evidence(pairs, unpaired, returns, (*lost, *found.moving.warnings, *_about(returns)))
+    targets = find_targets(_windows(recording, boxes), options.targets, progress=progress)
+    stamps = RadarScans(targets.moving.scans.times_ns, np.zeros(len(targets.moving.scans) + 1, dtype=np.int64))
+    returns = counted_returns(
+        camera, stamps, boxes, targets.tracks, classes=options.classes, max_gap_s=options.max_gap_s
+    )
+    return Evidence(pairs, unpaired, returns, (*lost, *targets.moving.warnings, *_about(returns)))
 
 
 def judged(
@@ -204,7 +206,7 @@ def evaluation_exit_code(evaluation: Evaluation) -> int:
     residuals, boxes = evaluation.residuals, evaluation.boxes
     if residuals is None and (boxes is None or boxes.acc is None):
         return 1
-    return 3 if any(one.code in _DOUBTFUL for one in evaluation.warnings) else 0
+    return 3 if any(warning.code in _DOUBTFUL for warning in evaluation.warnings) else 0
 
 
 def _under(pair: Pair, reference: Calibration) -> PairResult:

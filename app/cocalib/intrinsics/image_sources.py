@@ -82,8 +82,8 @@ class FileImages:
 
 def images_in(folder: Path) -> tuple[Path, ...]:
     """Return the image files directly in a folder, numbered ones in the order of their numbers."""
-    found = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
-    return tuple(sorted(found, key=_natural))
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
+    return tuple(sorted(paths, key=_natural))
 
 
 def series_of(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:

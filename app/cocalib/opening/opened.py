@@ -174,15 +174,15 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
     from_calibration = camera is not None and choice.camera_file is None and recording.camera() is None
     with part_of_choice("session"):
         copied = fitting_clicks(choice.copy_from, facts) if choice.copy_from is not None else None
-        found = session_folder(choice, facts)
+        folder = session_folder(choice, facts)
         workspace = open_workspace(
             recording,
             camera=camera,
-            session_folder=found.path,
+            session_folder=folder.path,
             name=choice.title,
             reference=shown.reference if shown else None,
             warnings=(
-                *found.warnings,
+                *folder.warnings,
                 *([] if copied is None else [copied.about]),
                 *(about_calibration(calibration.name, shown) if calibration else ()),
             ),
@@ -206,9 +206,9 @@ def _camera(choice: Choice, recording: Recording, calibration: "GivenCalibration
     if choice.camera_file is None and calibration is not None and recording.camera() is None:
         image = recording.image_bytes(0)
         with part_of_choice("calibration"):
-            found = calibration.camera((image.width_px, image.height_px))
-        if found is not None:
-            return found
+            camera = calibration.camera((image.width_px, image.height_px))
+        if camera is not None:
+            return camera
     if choice.camera_file is None:
         return camera_for(recording, None)
     with part_of_choice("camera"):
@@ -224,11 +224,11 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     if given is None:
         return None
     file, source = read_clicks_file(given.text, source=given.source), given.source
-    found = clicks_at_frames(file.clicks, recording.image_times, source=source, others=recording.other_image_times)
+    frames = clicks_at_frames(file.clicks, recording.image_times, source=source, others=recording.other_image_times)
     if file.unconfirmed is None:
-        return found
+        return frames
     note = f"{source}: nobody confirmed {len(file.unconfirmed.ids)} of these clicks: look at each"
-    return dataclasses.replace(found, notes=(*found.notes, note))
+    return dataclasses.replace(frames, notes=(*frames.notes, note))
 
 
 def _import_clicks(workspace: Workspace, source: str, found: ClicksAtFrames) -> None:
@@ -266,7 +266,7 @@ def _remember(workspace: Workspace, recording: Recording) -> None:
         print(f"In this session the radar was read with {words}; open it again with that")
     else:
         workspace.dispatch(ColumnsMapped(recording.column_map))
-    sure = tuple(one.assumption.words for one in recording.stated_assumptions if one.confirmed)
+    sure = tuple(assumption.assumption.words for assumption in recording.stated_assumptions if assumption.confirmed)
     if sure:
         workspace.dispatch(AssumptionsConfirmed(sure))
 
@@ -342,14 +342,14 @@ def fitting_clicks(folder: Path, facts: RecordingFacts) -> FittingClicks:
     Raises:
         SessionFileError: the session cannot be read.
     """
-    found = inspect_session(folder)
+    repair = inspect_session(folder)
     fitting = tuple(
         click
-        for click in found.clicks
+        for click in repair.clicks
         if facts.frame_at(click.image_time) is not None and facts.has_pixel(click.u_px, click.v_px)
     )
-    left = len(found.clicks) - len(fitting)
-    message = f"{len(fitting)} of the {len(found.clicks)} clicks in {folder} were copied"
+    left = len(repair.clicks) - len(fitting)
+    message = f"{len(fitting)} of the {len(repair.clicks)} clicks in {folder} were copied"
     if left:
         message += f"; {left} belong to frames that this recording does not have"
     return FittingClicks(
@@ -367,11 +367,11 @@ def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path 
     """
     folder = opened_in or choice.session or recording_session_folder(choice.paths)
     try:
-        found = inspect_session(folder)
+        repair = inspect_session(folder)
     except (SessionFileError, OSError):
         return SessionOffer(plan=choice.session_plan)
     continues = opened_in is not None or (facts is not None and has_session_of(folder, facts))
-    return SessionOffer(str(folder), len(found.clicks), found.recording, continues, choice.session_plan)
+    return SessionOffer(str(folder), len(repair.clicks), repair.recording, continues, choice.session_plan)
 
 
 def camera_of(found: ImportedCalibration, path: Path, size_px: tuple[int, int]) -> Camera | None:

@@ -51,11 +51,11 @@ class RootFolder:
                 f"{_shown(inside)}: only folders below {self.path} can be opened in the page; choose one from its list"
             )
         try:
-            found = self.path.joinpath(*parts).resolve(strict=True)
+            path = self.path.joinpath(*parts).resolve(strict=True)
         except (OSError, RuntimeError) as error:
             raise InputError(f"{_shown(inside)}: {_why(error)}; choose another one, or reload the list") from error
-        self.require_inside(found, inside)
-        return found
+        self.require_inside(path, inside)
+        return path
 
     def require_inside(self, found: Path, inside: str) -> None:
         """Refuse a real path that is not below the root.
@@ -74,11 +74,11 @@ class RootFolder:
         Raises:
             InputError: one of them cannot be used.
         """
-        found = tuple(self.resolve(path) for path in inside)
-        for path, given in zip(found, inside, strict=True):
+        paths = tuple(self.resolve(path) for path in inside)
+        for path, given in zip(paths, inside, strict=True):
             if (kind := special_kind(path)) is not None:
                 raise InputError(f"{_shown(given)}: is {kind}, not a recording; choose a file or a folder")
-        return found
+        return paths
 
     def listing(self, inside: str) -> FolderListing:
         """List the folders and recordings in a folder.
@@ -113,10 +113,10 @@ class RootFolder:
         if not entry.is_symlink():
             return True
         try:
-            found = Path(entry.path).resolve(strict=True)
+            path = Path(entry.path).resolve(strict=True)
         except (OSError, RuntimeError):
             return False
-        return found == self.path or self.path in found.parents
+        return path == self.path or self.path in path.parents
 
     def _entry(self, entry: "os.DirEntry[str]", here: str) -> FolderEntry | None:
         """Describe an entry; None if it is neither a folder nor a file that may be a recording."""

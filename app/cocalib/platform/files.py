@@ -231,7 +231,7 @@ def require_room(path: Path, size_bytes: float) -> None:
     Raises:
         InputError: less is free.
     """
-    place = next(one for one in path.absolute().parents if one.is_dir())
+    place = next(parent for parent in path.absolute().parents if parent.is_dir())
     free_bytes = shutil.disk_usage(path if path.is_dir() else place).free
     if free_bytes < size_bytes:
         raise InputError(

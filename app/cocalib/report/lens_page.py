@@ -87,8 +87,8 @@ def _foot() -> str:
 def _warning_list(lens: CalibratedLens) -> Markup:
     """Return the warnings with what to do."""
     items = [
-        tag("li", tag("code", one.code), " ", sentence(str(said.message)), " ", tag("b", sentence(str(said.hint))))
-        for one, said in zip(lens.warnings, map(told, lens.warnings), strict=True)
+        tag("li", tag("code", warning.code), " ", sentence(str(said.message)), " ", tag("b", sentence(str(said.hint))))
+        for warning, said in zip(lens.warnings, map(told, lens.warnings), strict=True)
     ]
     body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
     return tag("section", tag("h2", "Warnings"), body, id="cautions")
@@ -112,12 +112,12 @@ def _model_table(lens: CalibratedLens) -> Markup:
     """Return the models that were tried."""
     rows = [
         _row(
-            one.model,
-            _pixels(one.rms_px),
-            _pixels(one.held_out_rms_px),
-            one.fault or f"{one.worse_by:.4f} ± {one.standard_error:.4f}",
+            trial.model,
+            _pixels(trial.rms_px),
+            _pixels(trial.held_out_rms_px),
+            trial.fault or f"{trial.worse_by:.4f} ± {trial.standard_error:.4f}",
         )
-        for one in lens.trials
+        for trial in lens.trials
     ]
     heads = ("model", "RMS [px]", "held out [px]", "worse by [px²]")
     return tag(
@@ -165,11 +165,11 @@ def _pixels(value: float) -> str:
 
 def _residuals_over_the_image(lens: CalibratedLens) -> Markup:
     """Return the mean residuals as arrows over the image, and all residuals as a scatter."""
-    found = residual_field(lens)
+    field = residual_field(lens)
     return tag(
         "section",
         tag("h2", "Residuals"),
-        tag("div", _arrows(found, lens.camera), _scatter(found), class_="two"),
+        tag("div", _arrows(field, lens.camera), _scatter(field), class_="two"),
         id="residuals",
     )
 

@@ -96,7 +96,10 @@ def watched(
         name=recording.name,
         inputs=inputs,
         topics=tuple((what, f"{name}, by {clock} stamps" if clock else name) for what, name, clock in topics if name),
-        warnings=(*(DataWarning.reported(one.code, one.message, one.hint) for one in doubts), *recording.warnings),
+        warnings=(
+            *(DataWarning.reported(doubt.code, doubt.message, doubt.hint) for doubt in doubts),
+            *recording.warnings,
+        ),
         image=_image(recording, calibration),
     )
 

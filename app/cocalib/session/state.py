@@ -122,7 +122,7 @@ class RecordingFacts:
 
     def unconfirmed(self, session: "Session") -> tuple[AssumedReading, ...]:
         """Return the assumptions that the user has not confirmed."""
-        return tuple(one for one in self.assumptions if one.text not in session.confirmed)
+        return tuple(assumption for assumption in self.assumptions if assumption.text not in session.confirmed)
 
     def frame_at(self, time: TimeNs) -> int | None:
         """Return the index of the frame with exactly this stamp; None when no frame has it."""

@@ -31,9 +31,9 @@ def clicks_in_recording(
     Raises:
         InputError: the clicks are not of this recording, or one is outside its image.
     """
-    found = clicks_at_frames(clicks, recording.image_times, source=str(source), others=recording.other_image_times)
-    _require_inside(found.clicks, camera, source=source)
-    return found
+    frames = clicks_at_frames(clicks, recording.image_times, source=str(source), others=recording.other_image_times)
+    _require_inside(frames.clicks, camera, source=source)
+    return frames
 
 
 def require_confirmed(recording: Recording) -> None:
@@ -43,7 +43,10 @@ def require_confirmed(recording: Recording) -> None:
         InputError: there is an unconfirmed assumption; all are named.
     """
     if recording.assumptions:
-        named = "; ".join(f"{one.topic}: {one.text} (confirm: {one.confirm})" for one in recording.assumptions)
+        named = "; ".join(
+            f"{assumption.topic}: {assumption.text} (confirm: {assumption.confirm})"
+            for assumption in recording.assumptions
+        )
         raise InputError(
             f"{recording.name}: the recording does not state everything that is needed: {named}; "
             "state what is right, or confirm all of it with --confirm-assumptions"

@@ -142,7 +142,7 @@ def window_candidates(
         options, locating=dataclasses.replace(options.locating, max_candidates=_MOST_CANDIDATES)
     )
     alone = dataclasses.replace(click, chosen=None, mark="clicked")
-    return tuple(one for pair in pair_clicks([alone], scans, all_of_them).pairs for one in pair.candidates)
+    return tuple(candidate for pair in pair_clicks([alone], scans, all_of_them).pairs for candidate in pair.candidates)
 
 
 _OPTIONS_OF_PAIRING = (
@@ -274,7 +274,8 @@ def calibration_text(
         vehicle: which vehicle it is of; None if nobody said.
     """
     assumed = [
-        (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
+        (assumption.assumption, assumption.confirmed or assumption.assumption.words in confirmed)
+        for assumption in recording.stated_assumptions
     ]
     unsure = about_assumptions([assumption for assumption, sure in assumed if not sure])
     if unsure:

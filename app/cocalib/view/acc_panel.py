@@ -80,7 +80,7 @@ def acc_panel(evaluation: Evaluation) -> AccPanel:
             f"Too little to judge the calibration by: {boxes.matched_targets} of {_FEWEST_TARGETS} targets with a box, "
             f"{returns} of {_FEWEST_RETURNS} returns."
         )
-        others = tuple(one for one in warnings if one.code != "turned-from-boxes")
+        others = tuple(warning for warning in warnings if warning.code != "turned-from-boxes")
         return AccPanel(
             figures=_figures(boxes),
             classes=boxes.classes,

@@ -234,8 +234,10 @@ def placements_left(session: Session, placements: Sequence[Placement] | None) ->
     if not placements:
         return None
     times = [click.image_time for click in session.clicks if click.counts or click.excluded]
-    clicked = (any(one.start <= time <= one.end for time in times) for one in placements)
-    return sum(not (done or is_dismissed(one, session)) for one, done in zip(placements, clicked, strict=True))
+    clicked = (any(placement.start <= time <= placement.end for time in times) for placement in placements)
+    return sum(
+        not (done or is_dismissed(placement, session)) for placement, done in zip(placements, clicked, strict=True)
+    )
 
 
 def is_dismissed(placement: Placement, session: Session) -> bool:
@@ -296,7 +298,7 @@ def _early_line(session: Session) -> Words:
         waits = outcome.code == "too-few-pairs" and not outcome.unpaired
         return words(f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else "")
     used = [pair for pair in outcome.pairs if not pair.excluded]
-    grave = [one.code for one in outcome.warnings if consequence_of(one.code) not in ("limited", "note")]
+    grave = [warning.code for warning in outcome.warnings if consequence_of(warning.code) not in ("limited", "note")]
     sound = all(pair.inlier for pair in used) and all(code in _MORE_PAIRS_DECIDE for code in grave)
     if not outcome.options.models_noise or len(used) >= SURE_PAIRS or not sound:
         return Words()

@@ -99,8 +99,8 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     used = _used(calibration, pair, candidates)
     fits = candidate_fits(calibration, pair, candidates) if calibration else ()
     rows = [
-        _row(one, fits[i] if fits else None, used=i == used, chosen=i == used and pair.chosen is not None)
-        for i, one in enumerate(candidates)
+        _row(candidate, fits[i] if fits else None, used=i == used, chosen=i == used and pair.chosen is not None)
+        for i, candidate in enumerate(candidates)
     ]
     order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
     rival = _rival(calibration, pair, candidates)
@@ -116,16 +116,16 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
 def _in_view(calibration: Calibration, candidates: Sequence[Candidate], used: int) -> list[Candidate]:
     """Leave out what the camera does not see, not even with a margin; the return in use stays."""
     camera = calibration.camera
-    pixels_px = calibration.reproject(np.array([one.position_radar_m for one in candidates]))
+    pixels_px = calibration.reproject(np.array([candidate.position_radar_m for candidate in candidates]))
     seen = camera.in_image(pixels_px, margin_px=_MARGIN * camera.width_px)
-    return [one for i, one in enumerate(candidates) if seen[i] or i == used]
+    return [candidate for i, candidate in enumerate(candidates) if seen[i] or i == used]
 
 
 def _distinct(candidates: Sequence[Candidate]) -> list[Candidate]:
     kept: list[Candidate] = []
-    for one in candidates:
-        if all(np.abs(one.position_radar_m - other.position_radar_m).max() > _SAME_M for other in kept):
-            kept.append(one)
+    for candidate in candidates:
+        if all(np.abs(candidate.position_radar_m - other.position_radar_m).max() > _SAME_M for other in kept):
+            kept.append(candidate)
     return kept
 
 
@@ -144,7 +144,7 @@ def _rival(calibration: Calibration | None, pair: Pair, candidates: Sequence[Can
 
 def _at(position_m: Vector3, candidates: Sequence[Candidate]) -> int:
     """Return the index of the candidate at a position; -1 if there is none."""
-    away = [float(np.abs(one.position_radar_m - position_m).max()) for one in candidates]
+    away = [float(np.abs(candidate.position_radar_m - position_m).max()) for candidate in candidates]
     return int(np.argmin(away)) if away and min(away) <= _SAME_M else -1
 
 

@@ -65,7 +65,7 @@ def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
     For a radar without elevation only what the pairs determine; `assumed_figures` returns the rest.
     """
     figures = _mounting_figures(calibration)
-    shown = figures if calibration.sees_elevation else tuple(one for one in figures if one.key in _FIRM)
+    shown = figures if calibration.sees_elevation else tuple(figure for figure in figures if figure.key in _FIRM)
     return (*shown, *_image_figures(calibration), *_radar_figures(calibration))
 
 
@@ -74,13 +74,15 @@ def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
     if calibration.sees_elevation:
         return ()
     why = " This radar measures no elevation: the value holds if it is level and at the height of the placements."
-    return tuple(replace(one, hint=one.hint + why) for one in _mounting_figures(calibration) if one.key not in _FIRM)
+    return tuple(
+        replace(figure, hint=figure.hint + why) for figure in _mounting_figures(calibration) if figure.key not in _FIRM
+    )
 
 
 def firm_text(calibration: Calibration) -> str:
     """Return what a radar without elevation determines, in one line."""
-    figures = [one for one in pose_figures(calibration) if one.key in (*_FIRM, "image")]
-    return ", ".join(f"{one.label} {one.value} {one.unit}" for one in figures)
+    figures = [figure for figure in pose_figures(calibration) if figure.key in (*_FIRM, "image")]
+    return ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in figures)
 
 
 def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -254,16 +256,16 @@ def uncertainty_sentences(calibration: Calibration) -> tuple[Words, ...]:
 def refined_sentences(calibration: Calibration) -> tuple[str, ...]:
     """Say by how much refining changed the intrinsics; empty if they were not refined."""
     refined = [
-        one
-        for one in calibration.systematic_errors
-        if one.estimated and one.of_lens and (is_determined(one) or abs(one.value) >= one.prior_sigma > 0.0)
+        error
+        for error in calibration.systematic_errors
+        if error.estimated and error.of_lens and (is_determined(error) or abs(error.value) >= error.prior_sigma > 0.0)
     ]
     if calibration.given_camera is None:
         return ()
     parts = []
-    for one in refined:
-        words = error_words(one.name)
-        amount = with_sigma(words.factor * one.value, words.factor * one.sigma)
+    for result in refined:
+        words = error_words(result.name)
+        amount = with_sigma(words.factor * result.value, words.factor * result.sigma)
         parts.append(f"{words.label} by {amount} {words.unit}".rstrip())
     changed = "; ".join(parts) or "the pairs say nothing about them"
     return (sentence(f"the intrinsics were refined with the pose: {changed}"),)
@@ -280,8 +282,8 @@ def systematic_errors(calibration: Calibration) -> SystematicErrorTable:
 def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErrorResult]]:
     """Put errors of several axes that the pairs do not determine together; every other error stands alone."""
     groups: dict[str, list[SystematicErrorResult]] = {}
-    for one in errors:
-        groups.setdefault(one.name if is_determined(one) else family_of(one.name), []).append(one)
+    for error in errors:
+        groups.setdefault(error.name if is_determined(error) else family_of(error.name), []).append(error)
     return list(groups.values())
 
 

@@ -75,7 +75,7 @@ def _dataset(file: BoxFile) -> FileBoxes:
 def _labels(categories: Any, source: str) -> dict[str, str]:
     if not isinstance(categories, list):
         return {}
-    found = (_mapping(one, f"{source}: categories[{at}]") for at, one in enumerate(categories))
+    found = (_mapping(category, f"{source}: categories[{at}]") for at, category in enumerate(categories))
     return {str(one.get("id")): str(one.get("name", one.get("id"))) for one in found}
 
 

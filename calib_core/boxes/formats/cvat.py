@@ -43,10 +43,10 @@ def _read(file: BoxFile) -> FileBoxes:
         raise InputError(
             f"{file.source}: is the export of a project with {len(tasks)} tasks; export the task of this recording"
         )
-    found = _images(file.root, file.source) if file.root.find("image") is not None else _video(file.root, file.source)
+    boxes = _images(file.root, file.source) if file.root.find("image") is not None else _video(file.root, file.source)
     others = sum(1 for kind in _OTHER_SHAPES for _ in file.root.iter(kind))
     note = f"{others} shapes that are not boxes are left out"
-    return replace(found, notes=(*found.notes, note)) if others else found
+    return replace(boxes, notes=(*boxes.notes, note)) if others else boxes
 
 
 def _box(element: Element, place: str, label: str, track: str = "") -> Box:

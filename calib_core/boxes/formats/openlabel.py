@@ -191,8 +191,8 @@ def _link(root: Mapping[str, Any], moved: _Moved, child: str, parent: str, place
     """Return parent_from_child: the frame's, else the one that always holds; None if that is not stated."""
     for pair in ((child, parent), (parent, child)):
         if pair in moved:
-            found = _stated(_part(moved[pair], "transform_src_to_dst"), place)
-            return found if found is None or pair[0] == child else found.inverse()
+            transform = _stated(_part(moved[pair], "transform_src_to_dst"), place)
+            return transform if transform is None or pair[0] == child else transform.inverse()
     return _stated(_part(_part(_part(root, "coordinate_systems"), child), "pose_wrt_parent"), place)
 
 

@@ -129,9 +129,9 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
 
 def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
     """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
-    for one in CAMERA_FORMATS.values():
-        if one.own_syntax is not None and one.own_syntax.recognizes(content):
-            return one.own_syntax.read(content, source)
+    for value in CAMERA_FORMATS.values():
+        if value.own_syntax is not None and value.own_syntax.recognizes(content):
+            return value.own_syntax.read(content, source)
     return ()
 
 

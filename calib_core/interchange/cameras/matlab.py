@@ -60,13 +60,13 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
     if data.startswith(_MAT_7_3):
         raise InputError(f"{source}: a mat file of version 7.3; in MATLAB save it with -v7")
     variables = load_mat(data, source=source)
-    found = tuple(_found(name, values, source) for name, values in _structs(variables))
-    if not found:
+    cameras = tuple(_found(name, values, source) for name, values in _structs(variables))
+    if not cameras:
         raise InputError(
             f"{source}: no struct with IntrinsicMatrix, K or FocalLength in it; in MATLAB: "
             "s = toStruct(cameraParams); save('camera.mat', 's', '-v7')"
         )
-    return found
+    return cameras
 
 
 def _structs(variables: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

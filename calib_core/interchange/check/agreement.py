@@ -116,9 +116,9 @@ class Comparison:
 
 def _change_text(change: PoseChange) -> str:
     pose = change.first.perturbed(change.error)
-    found = pose_difference(change.first, pose, change.covariance)
-    turned = f"{shown(found.rotation_deg)} deg{_plus_minus(found.rotation_sigma_deg, 'deg')}"
-    moved = f"{shown(found.position_cm)} cm{_plus_minus(found.position_sigma_cm, 'cm')}"
+    difference = pose_difference(change.first, pose, change.covariance)
+    turned = f"{shown(difference.rotation_deg)} deg{_plus_minus(difference.rotation_sigma_deg, 'deg')}"
+    moved = f"{shown(difference.position_cm)} cm{_plus_minus(difference.position_sigma_cm, 'cm')}"
     return f"turned by {turned}, moved by {moved}"
 
 

@@ -118,8 +118,8 @@ def by_pairs(imported: ImportedCalibration, pairs: CheckPairs) -> list[CheckResu
     by_pose = pairs.misses_px(imported.camera_from_radar)
     alone = f"{shown(lens.rms_px)} px rms by the lens alone, {_half_within(by_pose)} by the pose alone"
     level: Literal["warning", "error"] = "error" if lens.rms_px > _OTHER_LENS_PX else "warning"
-    found = CheckResult(level, "other-lens", f"{message}; {alone}", "give both the intrinsics of one camera")
-    return [_by_pose(imported.pose, pairs, imported.camera), found]
+    result = CheckResult(level, "other-lens", f"{message}; {alone}", "give both the intrinsics of one camera")
+    return [_by_pose(imported.pose, pairs, imported.camera), result]
 
 
 def _half_within(misses_px: Values) -> str:

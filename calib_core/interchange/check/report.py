@@ -436,11 +436,11 @@ def by_its_calibration(imported: ImportedCalibration, origin: ImportedCalibratio
 
 def _by_pose(imported: ImportedCalibration, origin: ImportedCalibration) -> CheckResult:
     pose, right = imported.pose, origin.camera_from_radar
-    found = imported.camera_from_radar
-    deg = np.degrees(rotation_angle_rad(found.rotation @ right.rotation.T))
-    cm = 100.0 * float(np.linalg.norm(found.inverse().translation_m - right.inverse().translation_m))
+    transform = imported.camera_from_radar
+    deg = np.degrees(rotation_angle_rad(transform.rotation @ right.rotation.T))
+    cm = 100.0 * float(np.linalg.norm(transform.inverse().translation_m - right.inverse().translation_m))
     difference = f"{shown(deg)} deg and {shown(cm)} cm from that calibration"
-    missed = _pose_miss(found, right)
+    missed = _pose_miss(transform, right)
     if missed <= _TINY * (1.0 + float(np.linalg.norm(right.translation_m))):
         return CheckResult("good", "same-pose", "the pose is that calibration's")
     undone = explain(
@@ -540,7 +540,9 @@ class CheckedFile:
         if self.report is None:
             return self.unreadable
         results = self.report.results
-        first = next((one for level in ("error", "good", "warning") for one in results if one.level == level), None)
+        first = next(
+            (result for level in ("error", "good", "warning") for result in results if result.level == level), None
+        )
         return f"{self.name}: {self.verdict}" + (f": {first.message}" if first else "")
 
 
@@ -562,15 +564,15 @@ def _document(file: CheckedFile) -> dict[str, Any]:
     if report is None:
         unknown = dict.fromkeys(("format", "evidence", "stated_verdict", "calibration_sha256", "frames", "comparison"))
         return document | unknown | {"assumptions": [], "notes": [], "results": []}
-    found = report.imported
+    calibration = report.imported
     return document | {
-        "format": found.format,
-        "evidence": found.evidence,
-        "stated_verdict": msgspec.to_builtins(found.file.verdict) if found.file is not None else None,
-        "calibration_sha256": found.calibration_sha256,
-        "frames": msgspec.to_builtins(found.frames),
-        "assumptions": list(found.assumptions),
-        "notes": list(found.notes),
+        "format": calibration.format,
+        "evidence": calibration.evidence,
+        "stated_verdict": msgspec.to_builtins(calibration.file.verdict) if calibration.file is not None else None,
+        "calibration_sha256": calibration.calibration_sha256,
+        "frames": msgspec.to_builtins(calibration.frames),
+        "assumptions": list(calibration.assumptions),
+        "notes": list(calibration.notes),
         "results": msgspec.to_builtins(report.results),
         "comparison": _comparison(report),
     }

@@ -41,12 +41,12 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: {_KEY}: as the camera's pose in the radar the camera looks away from it, and would not if the matrix "
             "were inverted; invert it, or write it to a text file as camera_from_radar"
         )
-    found = ImportedCalibration(
+    calibration = ImportedCalibration(
         "autoware-ai",
         WrittenPose("matrix", matrix[:3, :3], matrix[:3, 3], "radar_from_camera"),
         assumptions=(_ASSUMPTION,),
     ).checked(source)
-    return with_camera(found, _camera(values, source=source), source=source)
+    return with_camera(calibration, _camera(values, source=source), source=source)
 
 
 def _camera(values: Mapping[str, Any], *, source: str) -> FoundCamera | None:

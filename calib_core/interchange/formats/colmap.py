@@ -75,13 +75,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(f"{source}: images.txt: contains {count} images; keep only the intended one")
     image, camera = _first_line(text), _first_line(members["cameras.txt"].decode("utf-8", errors="replace"))
     numbers = floats(image[1:8], source=source, place="images.txt", length=7)
-    found = ImportedCalibration(
+    calibration = ImportedCalibration(
         "colmap",
         WrittenPose("quaternion_wxyz", np.array(numbers[:4]), np.array(numbers[4:]), "camera_from_radar"),
         camera=found_colmap_camera(camera, source=source).camera(image_size_px=None, source=source),
         assumptions=() if stated_frames(text) else (_WORLD,),
     )
-    return with_statement(found, text).checked(source)
+    return with_statement(calibration, text).checked(source)
 
 
 def _first_line(text: str) -> list[str]:

@@ -88,8 +88,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     assumptions = (CORRECTED,) if any(is_corrected(sensor) for sensor in (radars[0], cameras[0])) else ()
     properties = cameras[0].get("properties")
     text = stated_lines(properties.get(STATEMENT_KEY)) if isinstance(properties, Mapping) else ""
-    found = ImportedCalibration("driveworks", pose, notes=(note,), assumptions=assumptions, in_third_frame=both)
-    return with_statement(found, text).checked(source)
+    calibration = ImportedCalibration("driveworks", pose, notes=(note,), assumptions=assumptions, in_third_frame=both)
+    return with_statement(calibration, text).checked(source)
 
 
 def posed_sensor(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:

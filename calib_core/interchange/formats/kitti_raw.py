@@ -112,9 +112,9 @@ def _projected(
         raise InputError(f"{source}: the projection of camera 2 has no camera matrix in it; correct it")
     offset_m = np.linalg.solve(matrix, projection[:, 3])
     camera2_from_camera0 = RigidTransform(np.eye(3), offset_m)
-    found = _found(camera2_from_camera0 @ camera0_from_radar, _UNDISTORTED, source=source)
+    calibration = _found(camera2_from_camera0 @ camera0_from_radar, _UNDISTORTED, source=source)
     camera = FoundCamera("P2", "", tuple(matrix.ravel().tolist()), (), size_px)
-    return with_camera(found, camera, source=source)
+    return with_camera(calibration, camera, source=source)
 
 
 def _found(camera_from_radar: RigidTransform, assumption: str, *, source: str) -> ImportedCalibration:

@@ -38,13 +38,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     topic = str(meta.get("points_topic") or "") if isinstance(meta, Mapping) else ""
     points = f"the points of {topic}" if topic else "the points it was made with"
     camera, notes = _camera(content.mapping.get("camera"), source=source)
-    found = ImportedCalibration(
+    calibration = ImportedCalibration(
         "koide3",
         WrittenPose("quaternion_xyzw", np.array(numbers[3:]), np.array(numbers[:3]), "radar_from_camera"),
         assumptions=(f"assumed that {points} are the radar's, x forward, y left, z up",),
         notes=notes,
     ).checked(source)
-    return with_camera(found, camera, source=source)
+    return with_camera(calibration, camera, source=source)
 
 
 def _camera(block: Any, *, source: str) -> tuple[FoundCamera | None, tuple[str, ...]]:

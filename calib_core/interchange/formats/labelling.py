@@ -55,8 +55,8 @@ def _read_scale(content: Content, source: str) -> ImportedCalibration:
                 f"{source}: no device_heading, so the camera's pose in the device is unknown; add it and device_position"
             )
         pose = _scale_pose(frame, "device_", source=source).inverse() @ pose
-    found = _found("scale", pose, (_AS_RADAR.format(place),), source=source)
-    return with_camera(found, _scale_camera(image, source=source), source=source)
+    calibration = _found("scale", pose, (_AS_RADAR.format(place),), source=source)
+    return with_camera(calibration, _scale_camera(image, source=source), source=source)
 
 
 def _scale_pose(block: Mapping[str, Any], prefix: str, *, source: str) -> RigidTransform:
@@ -115,8 +115,8 @@ def _read_segments(content: Content, source: str) -> ImportedCalibration:
         assumptions.append("no camera_convention: assumed OpenGL axes (y up, z backwards), the service's default")
     if convention.lower() != "opencv":
         pose = pose @ _OPENGL_FROM_OPTICAL
-    found = _found("segments", pose, tuple(assumptions), source=source)
-    return with_camera(found, _segments_camera(image, source=source), source=source)
+    calibration = _found("segments", pose, tuple(assumptions), source=source)
+    return with_camera(calibration, _segments_camera(image, source=source), source=source)
 
 
 def _segments_camera(image: Mapping[str, Any], *, source: str) -> FoundCamera | None:

@@ -39,7 +39,7 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             check = StatedCheckPoint(
                 np.ravel(arrays["check_point_radar_m"]), pixel_px=np.ravel(arrays["check_point_pixel_px"])
             )
-        found = ImportedCalibration(
+        calibration = ImportedCalibration(
             name,
             pose,
             camera=_camera(arrays),
@@ -49,7 +49,7 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             covariance=_covariance(arrays),
             faults=_faults(arrays),
         ).checked(source)
-        return with_statement(found, stated_lines(arrays.get(STATEMENT_KEY)))
+        return with_statement(calibration, stated_lines(arrays.get(STATEMENT_KEY)))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None
 

@@ -102,8 +102,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     assumptions = ["the format names no frames and assumes undistorted images"]
     if not radars:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
-        found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
-        return with_statement(found, text).checked(source)
+        calibration = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
+        return with_statement(calibration, text).checked(source)
     if stated_frames(text) is None:
         assumptions.append("the sensor without camera_intrinsic is taken to be the radar")
     radar_pose, both = _posed(radars[0], source=source), None
@@ -115,10 +115,10 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
-    found = ImportedCalibration(
+    calibration = ImportedCalibration(
         "nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px, in_third_frame=both
     )
-    return with_statement(found, text).checked(source)
+    return with_statement(calibration, text).checked(source)
 
 
 def _member(content: Content) -> bytes | None:

@@ -46,13 +46,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: coordinate_systems: {camera!r} looks away from {radar!r}, and would not if pose_wrt_parent were "
             "inverted, as some data sets write it; write it as the pose in the parent"
         )
-    found = ImportedCalibration(
+    calibration = ImportedCalibration(
         "openlabel",
         WrittenPose("matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"),
         frames=FrameNames(radar, camera),
         assumptions=_ASSUMPTIONS,
     ).checked(source)
-    return with_camera(found, _camera(_mapping(streams, camera), source=source), source=source)
+    return with_camera(calibration, _camera(_mapping(streams, camera), source=source), source=source)
 
 
 def _mapping(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:

@@ -64,7 +64,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
         lines.append(
             "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md "
             "(Files and formats under Help): "
-            + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
+            + ", ".join(f"{entry.name} {getattr(errors, entry.name):.6g}" for entry in fields(errors))
         )
     lines += corrections_lines(file)
     lines += _origin_lines(file)

@@ -209,7 +209,7 @@ def _pairs_in(
     translations = [half for half in halves if half.vector is not None]
     taken: set[object] = set()
     for half in rotations:
-        fitting = [one for one in translations if one.rest == half.rest] or translations
+        fitting = [translation for translation in translations if translation.rest == half.rest] or translations
         if len(fitting) != 1 or fitting[0].vector is None:
             fault = (
                 "a rotation, and no translation beside it" if not fitting else "a rotation, and several translations"
@@ -218,7 +218,7 @@ def _pairs_in(
             continue
         beside, vector = fitting[0], fitting[0].vector
         place = (*keys, *half.keys[:1]) if len(rotations) > 1 else keys
-        readings = tuple(PoseReading(one, vector) for one in half.readings)
+        readings = tuple(PoseReading(reading, vector) for reading in half.readings)
         names = (*keys, *half.keys, *beside.keys, *beside.names)
         search.add(place, readings, texts, names)
         taken |= {*half.keys, *beside.keys}
@@ -280,7 +280,7 @@ def matrix_readings(numbers: np.ndarray) -> tuple[PoseReading, ...]:
         return ()
     if numbers.size == 16:
         return (_homogeneous(_finite(numbers).reshape(4, 4)),)
-    found: list[PoseReading] = []
+    readings: list[PoseReading] = []
     fault = ""
     for key, words, rotation, translation in _ways_to_read_twelve(_finite(numbers)):
         try:
@@ -288,13 +288,13 @@ def matrix_readings(numbers: np.ndarray) -> tuple[PoseReading, ...]:
         except ValueError as error:
             fault = fault or str(error)
             continue
-        found.append(PoseReading(turned, translation))
-    if not found:
+        readings.append(PoseReading(turned, translation))
+    if not readings:
         raise ValueError(_with_scale(fault, numbers))
-    if len(found) == 1:
-        turned = found[0].turned
-        return (PoseReading(RotationReading(turned.rotation, words=turned.words), found[0].translation),)
-    return tuple(found)
+    if len(readings) == 1:
+        turned = readings[0].turned
+        return (PoseReading(RotationReading(turned.rotation, words=turned.words), readings[0].translation),)
+    return tuple(readings)
 
 
 def _homogeneous(matrix: np.ndarray) -> PoseReading:
@@ -501,10 +501,10 @@ def seven_number_readings(numbers: np.ndarray, words: Sequence[str] = ()) -> tup
             readings = _quaternion_readings(quaternion, set(words))
         except ValueError:
             continue
-        for one in readings:
-            key, both = f"{one.key}-xyz", f"{one.words}, then x y z"
+        for reading in readings:
+            key, both = f"{reading.key}-xyz", f"{reading.words}, then x y z"
             if position_first:
-                key, both = f"xyz-{one.key}", f"x y z, then {one.words}"
-            turned = RotationReading(one.rotation, key, both, one.weight * (0.8 if position_first else 0.2))
+                key, both = f"xyz-{reading.key}", f"x y z, then {reading.words}"
+            turned = RotationReading(reading.rotation, key, both, reading.weight * (0.8 if position_first else 0.2))
             found.append(PoseReading(turned, _finite(translation)))
     return tuple(found)

@@ -235,14 +235,14 @@ def contradicts_names(pose: FoundPose, hypothesis: Hypothesis) -> bool:
 
 def likely_ones(hypotheses: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
     """Return those to show to a person: all that are likely, and a few more to compare with."""
-    likely = sum(one.share >= _LEAST_SHARE for one in hypotheses)
+    likely = sum(hypothesis.share >= _LEAST_SHARE for hypothesis in hypotheses)
     return hypotheses[: min(max(likely, _FEWEST), _MOST)]
 
 
 def _merged(meanings: Iterable[Meaning]) -> list[Hypothesis]:
     """Return the different poses of meanings, each with all of its meanings and their weights added."""
     found: list[tuple[RigidTransform, list[Meaning]]] = []
-    ordered = sorted(meanings, key=lambda one: -one.weight)
+    ordered = sorted(meanings, key=lambda meaning: -meaning.weight)
     rotations = np.zeros((len(ordered), 9))
     translations_m = np.zeros((len(ordered), 3))
     for meaning in ordered:
@@ -277,7 +277,7 @@ def _tested(one: Hypothesis, pairs: CheckPairs | None, against: RigidTransform |
 
 def _by_pairs(hypotheses: Sequence[Hypothesis], pairs: CheckPairs) -> np.ndarray:
     """Return the log-likelihood of the pairs under each pose (n,), with heavy tails: some pairs may be wrong."""
-    misses_px = np.stack([pairs.misses_px(one.camera_from_radar) for one in hypotheses])
+    misses_px = np.stack([pairs.misses_px(hypothesis.camera_from_radar) for hypothesis in hypotheses])
     misses_px = np.minimum(misses_px, 1e4)
     sigma_px = max(float(np.median(misses_px, axis=1).min()), _LEAST_SIGMA_PX)
     return np.asarray(-1.5 * np.log1p((misses_px / sigma_px) ** 2 / 2).sum(axis=1))

@@ -163,7 +163,9 @@ def picked(hypotheses: tuple[Hypothesis, ...], wanted: str, source: str) -> Hypo
         InputError: there is none with these parts, or there are several.
     """
     parts = {part.strip() for part in wanted.split(",") if part.strip()}
-    fitting = [one for one in hypotheses if any(parts <= set(meaning.parts) for meaning in one.meanings)]
+    fitting = [
+        hypothesis for hypothesis in hypotheses if any(parts <= set(meaning.parts) for meaning in hypothesis.meanings)
+    ]
     exact = [one for one in fitting if any(parts == set(meaning.key.split(",")) for meaning in one.meanings)]
     if len(exact) == 1:
         return exact[0]
@@ -223,7 +225,7 @@ def read_clear(content: str | bytes, source: str = "calibration") -> ImportedCal
     hypotheses = hypotheses_of(pose)
     clear = clear_one(pose, hypotheses)
     if clear is None:
-        keys = " or ".join(one.key for one in hypotheses[:2])
+        keys = " or ".join(hypothesis.key for hypothesis in hypotheses[:2])
         raise InputError(
             f"{source}: does not state what its numbers mean ({keys}, for example); pick it with cocalib import FILE --as MEANING"
         )
@@ -258,9 +260,9 @@ def _camera(file: UnstatedFile, pose: FoundPose) -> tuple[Camera | None, np.ndar
     Raises:
         InputError: a parameter is invalid.
     """
-    found = file.beside.get(pose.place, file.camera)
-    if found is None:
+    camera = file.beside.get(pose.place, file.camera)
+    if camera is None:
         return None, None
-    if found.size_px is not None:
-        return found.camera(image_size_px=None, source=file.source), None
-    return None, None if any(found.distortion) else np.reshape(found.matrix_px, (3, 3))
+    if camera.size_px is not None:
+        return camera.camera(image_size_px=None, source=file.source), None
+    return None, None if any(camera.distortion) else np.reshape(camera.matrix_px, (3, 3))

@@ -110,7 +110,7 @@ def calibration_file(
         for pair in calibration.pairs
     )
     stamped = dataclasses.replace(calibration, pairs=pairs)
-    unconfirmed = sum(not one.confirmed for one in provenance.assumptions) if provenance else 0
+    unconfirmed = sum(not assumption.confirmed for assumption in provenance.assumptions) if provenance else 0
     return CalibrationFile(
         calibration=stamped,
         frames=frames or FrameNames(),
@@ -229,10 +229,10 @@ def _imported(content: Mapping[str, Any], source: str) -> ImportedCalibration:
     file = _file(document, pose, source=source)
     kept = kept_results(content, documents.CalibrationDocument)
     as_written = WrittenPose("matrix", np.array(stated.rotation), np.array(stated.translation_m), "camera_from_radar")
-    found = imported(dataclasses.replace(file, kept=kept))
+    calibration = imported(dataclasses.replace(file, kept=kept))
     unknown = [key for key in content if key not in (fields_of(documents.CalibrationDocument) or ())]
     notes = (f"unknown keys, kept as they are: {', '.join(unknown)[:_SHOWN]}",) if unknown else ()
-    return dataclasses.replace(found, pose=as_written, faults=tuple(faults), notes=notes)
+    return dataclasses.replace(calibration, pose=as_written, faults=tuple(faults), notes=notes)
 
 
 def _file(

@@ -84,14 +84,14 @@ def _parameters(camera: Camera) -> list[LensParameterDocument]:
 def _models(lens: CalibratedLens) -> list[ModelTrialDocument]:
     return [
         ModelTrialDocument(
-            one.model,
-            finite_or_none(one.rms_px),
-            finite_or_none(one.held_out_rms_px),
-            finite_or_none(one.worse_by),
-            finite_or_none(one.standard_error),
-            one.fault,
+            trial.model,
+            finite_or_none(trial.rms_px),
+            finite_or_none(trial.held_out_rms_px),
+            finite_or_none(trial.worse_by),
+            finite_or_none(trial.standard_error),
+            trial.fault,
         )
-        for one in lens.trials
+        for trial in lens.trials
     ]
 
 
@@ -117,15 +117,15 @@ def _uncertainty(lens: CalibratedLens) -> UncertaintyDocument:
 
 
 def _field(lens: CalibratedLens) -> ResidualFieldDocument:
-    found = residual_field(lens)
+    field = residual_field(lens)
     return ResidualFieldDocument(
-        found.x_px.tolist(),
-        found.y_px.tolist(),
-        [[(finite_or_none(u), finite_or_none(v)) for u, v in row] for row in found.means_px],
-        [_numbers(row) for row in found.errors_px],
-        found.counts.tolist(),
-        finite_or_none(found.systematic_px),
-        residuals_text(found),
+        field.x_px.tolist(),
+        field.y_px.tolist(),
+        [[(finite_or_none(u), finite_or_none(v)) for u, v in row] for row in field.means_px],
+        [_numbers(row) for row in field.errors_px],
+        field.counts.tolist(),
+        finite_or_none(field.systematic_px),
+        residuals_text(field),
     )
 
 

@@ -119,7 +119,7 @@ def read_pairs_table(
         if len(cells) > len(columns) or not all(_is_number(row.get(name, "")) for name in _TABLE_COLUMNS):
             commas = (
                 "write decimal points, not commas; "
-                if any(_is_number(one.replace(",", ".")) for one in cells if "," in one)
+                if any(_is_number(cell.replace(",", ".")) for cell in cells if "," in cell)
                 else ""
             )
             raise InputError(

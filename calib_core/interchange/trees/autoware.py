@@ -51,11 +51,11 @@ def _joint(parent: str, child: str, entry: PlacedValue, text: str, source: str) 
     if missing:
         raise InputError(f"{place}: {parent}.{child}: {', '.join(missing)} is missing; add it")
     values = [value for value in found if value is not None]
-    numbers = np.array(floats([one.text for one in values], source=source, place=f"{parent}.{child}"))
+    numbers = np.array(floats([value.text for value in values], source=source, place=f"{parent}.{child}"))
     return Joint.posed(
         parent,
         child,
         WrittenPose("rpy", numbers[3:], numbers[:3], "radar_from_camera"),
         place,
-        numbers=JointNumbers.at("rpy", [one.span_in(text) for one in values]),
+        numbers=JointNumbers.at("rpy", [value.span_in(text) for value in values]),
     )

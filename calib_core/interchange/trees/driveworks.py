@@ -23,14 +23,14 @@ def recognizes_driveworks(content: Content) -> bool:
 def has_one_of_each(content: Content) -> bool:
     """Return whether a rig has exactly one radar and one camera, which the format's own reader reads."""
     sensors = [one for one in content.mapping["rig"]["sensors"] if isinstance(one, Mapping)]
-    protocols = [str(one.get("protocol", "")).lower() for one in sensors]
+    protocols = [str(sensor.get("protocol", "")).lower() for sensor in sensors]
     return all(sum(name.startswith(kind) for name in protocols) == 1 for kind in ("radar", "camera"))
 
 
 def read_driveworks(content: Content, source: str) -> TreePart:
     """Read every sensor with a pose; a joint whose numbers or corrections cannot be read cannot be used."""
     sensors = [one for one in content.mapping["rig"]["sensors"] if isinstance(one, Mapping) and one.get("name")]
-    posed = [one for one in sensors if isinstance(one.get(_POSE), Mapping)]
+    posed = [sensor for sensor in sensors if isinstance(sensor.get(_POSE), Mapping)]
     joints = tuple(_joint(one, content.text, source) for one in posed)
     corrected = any(is_corrected(one) for one in posed)
     return TreePart(

@@ -250,13 +250,13 @@ def _is_inside_camera(tree: FrameTree, joint: Joint) -> bool:
 
 
 def _named(between: Sequence[Step], name: str, path: Sequence[Step]) -> Joint:
-    found = [step.joint for step in between if name.lstrip("/") in (step.joint.name, step.joint.child)]
-    if len(found) != 1:
+    joints = [step.joint for step in between if name.lstrip("/") in (step.joint.name, step.joint.child)]
+    if len(joints) != 1:
         raise InputError(
             f"--joint: no joint {name!r} that can be changed lies between the radar and the camera; those on the way are "
             f"{_listed(path)}; name one of them by its name or its child frame"
         )
-    return found[0]
+    return joints[0]
 
 
 def _described(joint: Joint) -> str:

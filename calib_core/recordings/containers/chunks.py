@@ -365,16 +365,16 @@ class ChunkedSource:
     def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Read the first bytes of many messages, in the order of the index."""
         cache = self._kept if keep else None
-        found = heads_from(cache, index, size)
-        if found is None:
+        heads = heads_from(cache, index, size)
+        if heads is None:
             places = self._far_places(index, size)
-            found = (
+            heads = (
                 gather_far(self, self.file, index, places, size)
                 if places is not None
                 else gather_heads(self, index, size)
             )
-            keep_heads(cache, index, size, found)
-        return found
+            keep_heads(cache, index, size, heads)
+        return heads
 
     def _far_places(self, index: MessageIndex, size: int) -> Indices | None:
         """Return the file positions of uncompressed messages that are far apart; None otherwise."""

@@ -138,7 +138,7 @@ class CopiedFile:
         for first in range(0, len(places.order), _ROWS_TOGETHER):
             some = places.order[first : first + _ROWS_TOGETHER]
             columns = (places.channel[some], places.receive_ns[some], *np.divmod(places.place[some], places.span))
-            for number, receive_ns, chunk, offset in zip(*(one.tolist() for one in columns), strict=True):
+            for number, receive_ns, chunk, offset in zip(*(column.tolist() for column in columns), strict=True):
                 channel = self.channels[number]
                 if receive_ns < 0:
                     losses.note(
@@ -194,10 +194,14 @@ def _complete(source: Source, stored: Mapping[int, StoredChannel]) -> Mapping[in
     """Add the channels whose records could not be found again as the reader understood them."""
     languages = {"msg": "ros1msg" if isinstance(source, Rosbag1Source) else "ros2msg", "idl": "ros2idl"}
     read = {
-        one.id: StoredChannel(
-            one.topic, one.encoding, one.type, languages.get(one.definition_format, ""), one.definition.encode()
+        channel.id: StoredChannel(
+            channel.topic,
+            channel.encoding,
+            channel.type,
+            languages.get(channel.definition_format, ""),
+            channel.definition.encode(),
         )
-        for one in source.channels
+        for channel in source.channels
     }
     return {**read, **stored}
 
@@ -223,12 +227,12 @@ def _log_time(message: StoredMessage) -> int:
 def besides_messages(source: McapSource) -> BesidesMessages:
     """Read what a file holds besides messages; a file without an index is walked through once more."""
     if source.recovered:
-        found = FoundInMcap([Chunk(0, source.size_bytes, source.size_bytes, "")])
+        mcap = FoundInMcap([Chunk(0, source.size_bytes, source.size_bytes, "")])
         parts = []
-        for part in parts_of_mcap(source.file, found):
-            found.messages.clear()
+        for part in parts_of_mcap(source.file, mcap):
+            mcap.messages.clear()
             parts.append(part)
-        declared = found.declarations
+        declared = mcap.declarations
     else:
         declared = Declarations()
         parts = list(_parts(source))

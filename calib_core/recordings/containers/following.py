@@ -82,7 +82,7 @@ class FollowedFiles:
     @property
     def is_complete(self) -> bool:
         """Whether all files have been closed by their writer; a folder of ROS 2 then has its metadata."""
-        if not self._files or len({self._given(one.path) for one in self._files.values()}) < len(self._paths):
+        if not self._files or len({self._given(value.path) for value in self._files.values()}) < len(self._paths):
             return False
         closed = [followed.source.is_complete or _has_metadata(followed) for followed in self._files.values()]
         return all(closed) and not any(_is_unfinished_folder(path) for path in self._paths)
@@ -461,17 +461,17 @@ class GrowingDatabase(SqliteSource):
             return 0
         try:
             with self._database() as database:
-                found = rows_after(database, self._last_row)
+                rows = rows_after(database, self._last_row)
                 last = database.execute("SELECT max(id) FROM messages").fetchone()[0] or 0
         except sqlite3.Error as error:
             raise self._damaged(error) from error
         if last < self._last_row:
             raise RecordingError(f"{self.path}: rows that had been read are gone; open the recording again")
-        if not len(found.columns):
+        if not len(rows.columns):
             return 0
-        self._strange += found.strange
-        self._add(found.columns)
-        return len(found.columns)
+        self._strange += rows.strange
+        self._add(rows.columns)
+        return len(rows.columns)
 
     def _add(self, columns: np.ndarray) -> None:
         if not self._last_row:

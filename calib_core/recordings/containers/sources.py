@@ -47,7 +47,10 @@ class StatedAssumption:
 
 def about_assumptions(assumptions: Sequence[Assumption]) -> list[DataWarning]:
     """Warn about each unconfirmed assumption."""
-    return [DataWarning.reported("assumed", one.words, assumption_hint(one.confirm)) for one in assumptions]
+    return [
+        DataWarning.reported("assumed", assumption.words, assumption_hint(assumption.confirm))
+        for assumption in assumptions
+    ]
 
 
 def assumption_hint(confirm: str) -> str:

@@ -175,15 +175,15 @@ def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
     """
     try:
         batches, strange = _batches(connection, "SELECT topic_id, timestamp, id FROM messages", ())
-        found = FoundRows(_joined(batches), strange=strange)
+        rows = FoundRows(_joined(batches), strange=strange)
     except sqlite3.Error as error:
         fault = " ".join(str(error).split())
-        found = _around_damage(connection, _last_row(connection, path), fault)
-    found = replace(found, missed=max(0, _counted(connection) - len(found.columns) - found.strange))
-    if (np.diff(found.columns[:, 2]) > 0).all():
-        return found
-    _, first = np.unique(found.columns[:, 2], return_index=True)
-    return replace(found, columns=found.columns[np.sort(first)], repeated=len(found.columns) - len(first))
+        rows = _around_damage(connection, _last_row(connection, path), fault)
+    rows = replace(rows, missed=max(0, _counted(connection) - len(rows.columns) - rows.strange))
+    if (np.diff(rows.columns[:, 2]) > 0).all():
+        return rows
+    _, first = np.unique(rows.columns[:, 2], return_index=True)
+    return replace(rows, columns=rows.columns[np.sort(first)], repeated=len(rows.columns) - len(first))
 
 
 def _counted(connection: sqlite3.Connection) -> int:
@@ -419,21 +419,23 @@ class SqliteSource:
         quality = dict(self._rows("SELECT id, offered_qos_profiles FROM topics")) if _QUALITY in have else {}
         languages = {form: language for language, form in _FORMATS.items()}
         found = {}
-        for one in self.channels:
-            notes = ((_QUALITY, str(quality[one.id])),) if quality.get(one.id) else ()
-            language = languages.get(one.definition_format, "")
-            definition = one.definition.encode() if language else b""
-            found[one.id] = StoredChannel(one.topic, one.encoding, one.type, language, definition, notes)
+        for channel in self.channels:
+            notes = ((_QUALITY, str(quality[channel.id])),) if quality.get(channel.id) else ()
+            language = languages.get(channel.definition_format, "")
+            definition = channel.definition.encode() if language else b""
+            found[channel.id] = StoredChannel(
+                channel.topic, channel.encoding, channel.type, language, definition, notes
+            )
         return found
 
     def index(self, channel_id: int) -> MessageIndex:
         """Return the locations of a channel's messages; SQLite scans the heads of all rows once, for all channels."""
         if self._indexes is None:
-            found = self._all_rows()
-            self._indexes = self._sorted(found.columns)
+            rows = self._all_rows()
+            self._indexes = self._sorted(rows.columns)
             known = {channel.id for channel in self.channels}
             unknown = sum(len(index) for number, index in self._indexes.items() if number not in known)
-            self.warnings = (*self.warnings, *about_rows(self.path, found, unknown))
+            self.warnings = (*self.warnings, *about_rows(self.path, rows, unknown))
         empty = np.zeros(0, dtype=np.int64)
         return self._indexes.get(channel_id, MessageIndex(empty, empty, empty))
 
@@ -445,10 +447,10 @@ class SqliteSource:
         if kept is not None and kept.keys() == {"columns"} and kept["columns"].dtype == np.int64:
             return FoundRows(kept["columns"].reshape(-1, 3))
         with self._database() as database:
-            found = scan_rows(database, self.path)
-        if self._kept is not None and not found.incomplete:
-            self._kept.put("rows", {"columns": found.columns})
-        return found
+            rows = scan_rows(database, self.path)
+        if self._kept is not None and not rows.incomplete:
+            self._kept.put("rows", {"columns": rows.columns})
+        return rows
 
     def _beginning(self, count: int) -> FoundRows:
         try:

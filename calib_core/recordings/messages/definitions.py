@@ -132,11 +132,11 @@ class Definition:
     @property
     def names(self) -> frozenset[str]:
         """The names of the message's own fields."""
-        return frozenset(one.name for one in self.fields)
+        return frozenset(entry.name for entry in self.fields)
 
     def field(self, name: str) -> Field:
         """Return one of the message's own fields."""
-        return next(one for one in self.fields if one.name == name)
+        return next(entry for entry in self.fields if entry.name == name)
 
     @property
     def stamp_offset(self) -> int | None:
@@ -301,14 +301,14 @@ def _field_from_rosbags(name: str, description: tuple[int, object]) -> Field:
 def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Field, ...]]) -> tuple[Field, ...]:
     """Replace every nested type by its short name: a bare name is in the same package, Header in std_msgs."""
     resolved = []
-    for one in fields:
-        kind = one.type
+    for entry in fields:
+        kind = entry.type
         if kind not in PRIMITIVES and kind not in ("string", "wstring") and kind not in types:
             package = owner.partition("/")[0]
             kind = "std_msgs/Header" if kind == "Header" else f"{package}/{kind}"
-            if "/" in one.type or kind not in types:
-                kind = _known(one.type if "/" in one.type else kind, owner)
-        resolved.append(replace(one, type=kind))
+            if "/" in entry.type or kind not in types:
+                kind = _known(entry.type if "/" in entry.type else kind, owner)
+        resolved.append(replace(entry, type=kind))
     return tuple(resolved)
 
 

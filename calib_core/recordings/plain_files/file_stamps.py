@@ -314,8 +314,8 @@ def _cells(line: str) -> list[str]:
 
 
 def _zoneless(text: str) -> bool:
-    found = date_text(text)
-    return found is not None and not found.zoned
+    moment = date_text(text)
+    return moment is not None and not moment.zoned
 
 
 def _one_per_line(

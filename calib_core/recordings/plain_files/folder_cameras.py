@@ -64,8 +64,8 @@ def camera_beside(folder: Path, files: Sequence[Path], image_size_px: tuple[int,
         image_size_px: of the first; None if it cannot be read.
     """
     try:
-        found = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, image_size_px)
-        return found or _of_nuscenes(folder, files) or _of_astyx(folder, files)
+        camera = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, image_size_px)
+        return camera or _of_nuscenes(folder, files) or _of_astyx(folder, files)
     except (OSError, ValueError, KeyError, TypeError, RecursionError, AttributeError, InputError):
         return None  # a file of that name but of another form is not a data set's calibration
 
@@ -120,19 +120,19 @@ def _of_kitti_frames(folder: Path, files: Sequence[Path]) -> FolderCamera | None
     if number is None or not files:
         return None
     candidates = [beside / f"{file.stem}.txt" for file in (files[0], files[len(files) // 2], files[-1])]
-    found = [path for path in candidates if path.is_file()]
-    if not found:
-        found = sorted(beside.glob("*.txt"))[:1] or [path for path in (folder.parent / "calib.txt",) if path.is_file()]
-    if not found:
+    paths = [path for path in candidates if path.is_file()]
+    if not paths:
+        paths = sorted(beside.glob("*.txt"))[:1] or [path for path in (folder.parent / "calib.txt",) if path.is_file()]
+    if not paths:
         return None
-    matrices = [lines[f"P{number}"].reshape(3, 4)[:, :3] for path in found if f"P{number}" in (lines := _lines(path))]
+    matrices = [lines[f"P{number}"].reshape(3, 4)[:, :3] for path in paths if f"P{number}" in (lines := _lines(path))]
     if not matrices:
         return None
     doubt = ""
     if any(np.abs(matrix - matrices[0]).max() > 0.5 for matrix in matrices):
         doubt = "the files of other frames have other intrinsics; those of the first frame are used"
-    pose = f"its pose: --calibration {found[0]}" if "Tr_velo_to_cam" in _lines(found[0]) else ""
-    return FolderCamera(found[0], matrices[0], np.zeros(0), None, pose, doubt)
+    pose = f"its pose: --calibration {paths[0]}" if "Tr_velo_to_cam" in _lines(paths[0]) else ""
+    return FolderCamera(paths[0], matrices[0], np.zeros(0), None, pose, doubt)
 
 
 def _of_raw_kitti(folder: Path, image_size_px: tuple[int, int] | None) -> FolderCamera | None:

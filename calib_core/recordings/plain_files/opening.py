@@ -230,7 +230,7 @@ def _with_own_topic(source: PlainSource, taken: Sequence[str]) -> PlainSource:
         return source
     above = "".join(letter if letter.isalnum() else "_" for letter in source.path.parent.name)
     own = f"/{above}{topic}"
-    assumptions = tuple(replace(one, topic=own) for one in source.assumptions)
+    assumptions = tuple(replace(assumption, topic=own) for assumption in source.assumptions)
     return replace(source, channel=replace(source.channel, topic=own), assumptions=assumptions)
 
 
@@ -305,7 +305,7 @@ def _kind(file: Path) -> str:
 def _no_files(entries: Sequence[Path]) -> list[tuple[Path, str]]:
     """Name what has the name of an image, a scan or a table and is no file, so that it is not lost in silence."""
     what = "a broken link, a pipe or a folder"
-    tables = [one for one in entries if one.suffix.lower() in TABLE_SUFFIXES and not one.is_dir()]
+    tables = [entry for entry in entries if entry.suffix.lower() in TABLE_SUFFIXES and not entry.is_dir()]
     return [(one, what) for one in (*filter(_kind, entries), *tables) if not one.is_file()]
 
 

@@ -395,9 +395,9 @@ def packet_in(data: bytes) -> Packet | None:
         return None
     for header in _HEADER_SIZES:
         for inclusive in (0, _TLV.size):  # some demos count the item's own head
-            found = _items(data[:size], header, items, inclusive)
-            packet = Packet(version >> 24, size, platform, frame, cycles, count, found or ())
-            if found is not None and _fits(packet, data):
+            tlvs = _items(data[:size], header, items, inclusive)
+            packet = Packet(version >> 24, size, platform, frame, cycles, count, tlvs or ())
+            if tlvs is not None and _fits(packet, data):
                 return packet
     return None
 

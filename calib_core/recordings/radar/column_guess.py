@@ -240,22 +240,22 @@ def choose(
     columns: Sequence[DescribedColumn], rules: Rules = "message", stated: StatedReading = NOTHING_STATED
 ) -> Chosen:
     """Choose a column for each quantity."""
-    found = _picked_of_table(columns, stated) if rules == "table" else _picked_of_message(columns)
-    found.sort(key=lambda one: one.order)
+    pickeds = _picked_of_table(columns, stated) if rules == "table" else _picked_of_message(columns)
+    pickeds.sort(key=lambda one: one.order)
     picked: dict[str, Picked] = {}
     sigma: dict[str, Picked] = {}
-    for one in found:
+    for one in pickeds:
         if one.meaning.sigma:
             sigma.setdefault(one.quantity, one)
         elif not one.meaning.second and one.meaning.kind != "vague":
             picked.setdefault(one.quantity, one)
-    first = [one for one in found if not one.meaning.sigma and not one.meaning.second]
+    first = [one for one in pickeds if not one.meaning.sigma and not one.meaning.second]
     picked |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
-    second = (one for one in found if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
+    second = (one for one in pickeds if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
     others = tuple(one.name for one in second) if "azimuth" in picked else ()
     vague = [one for one in first if one.meaning.kind == "vague"]
     told_apart = _told_apart(vague, picked)
-    used = [one.name for one in picked.values()]
+    used = [value.name for value in picked.values()]
     unused = tuple(one.name for one in vague if one.name not in used)
     heights = tuple(one.name for one in first if one.quantity == "z" and one.column.filled)
     rivals: dict[str, str] = {}
@@ -270,10 +270,10 @@ def _picked_of_message(columns: Sequence[DescribedColumn]) -> list[Picked]:
     """Return the columns that mean something; none if one of them is not a radar's."""
     if any(has_word(column.name, *_NOT_RADARS) for column in columns):
         return []
-    found = [one for one in (_picked(column, name) for column, name in _stripped(columns)) if one is not None]
+    pickeds = [one for one in (_picked(column, name) for column, name in _stripped(columns)) if one is not None]
     if any(has_word(column.name, *_SIZES) for column in columns):
-        found = [one for one in found if not has_word(one.name, "height")]  # of an object
-    return found
+        pickeds = [picked for picked in pickeds if not has_word(picked.name, "height")]  # of an object
+    return pickeds
 
 
 def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
@@ -301,7 +301,7 @@ def _picked(column: DescribedColumn, name: str) -> Picked | None:
 def _picked_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[Picked]:
     """Return the columns that --map chooses, and of the other quantities those whose names mean something."""
     given = {one.column: one for one in stated.column_map}
-    taken = {one.quantity for one in given.values()}
+    taken = {value.quantity for value in given.values()}
     if not taken.isdisjoint(_POLAR[:2]) and taken.isdisjoint("xy"):
         taken |= set("xyz")  # the user says what to use
     found = []
@@ -352,11 +352,11 @@ def unknown_unit(written: str, unit_below: str = "") -> tuple[str, str] | None:
     stated, words = stated or unit_below, re.split(r"[^A-Za-z0-9]+", name)
     if not stated and len(words) == 2 and column_meaning(name) is None:
         name, stated = words
-    found = column_meaning(name) if stated else None
-    if found and not is_plain(name, found) and name != split_unit(written)[0]:
+    meaning = column_meaning(name) if stated else None
+    if meaning and not is_plain(name, meaning) and name != split_unit(written)[0]:
         return None
-    known = found is None or (not stated.isdigit() and table_meaning(name, stated) is not None)
-    return None if found is None or known else (found.quantity, stated.lower())
+    known = meaning is None or (not stated.isdigit() and table_meaning(name, stated) is not None)
+    return None if meaning is None or known else (meaning.quantity, stated.lower())
 
 
 def split_unit(written: str) -> tuple[str, str]:
@@ -369,9 +369,9 @@ def split_unit(written: str) -> tuple[str, str]:
 def _together(found: Sequence[Picked], axes: tuple[str, str, str]) -> dict[str, Picked]:
     """Choose x and y (and z) of one position, not of two."""
     stems: dict[tuple[str, ...], dict[str, Picked]] = {}
-    for one in found:
-        if one.quantity in axes:
-            stems.setdefault(one.stem, {}).setdefault(one.quantity, one)
+    for picked in found:
+        if picked.quantity in axes:
+            stems.setdefault(picked.stem, {}).setdefault(picked.quantity, picked)
     whole = [group for group in stems.values() if axes[0] in group and axes[1] in group]
     return min(whole, key=lambda group: (not group[axes[0]].column.filled, group[axes[0]].order), default={})
 
@@ -502,13 +502,13 @@ class _Guess:
             text = f"{what}, which is too far; the unit is taken all the same"
             return units, why, self._about_units("length-unit", text, group, usual, sides)
         largest = farthest(*(one.column.values for one in group))
-        found = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
-        units = [found.unit] * len(group)
-        if found is proven or (found.certain and not self.of_table):
-            return units, found.why, None
-        self._refuse_either(group, found)
-        text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the {self.noun} does not state the unit"
-        return units, "assumed", self._about_units("length-unit", text, group, found.unit, sides)
+        finding = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
+        units = [finding.unit] * len(group)
+        if finding is proven or (finding.certain and not self.of_table):
+            return units, finding.why, None
+        self._refuse_either(group, finding)
+        text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
+        return units, "assumed", self._about_units("length-unit", text, group, finding.unit, sides)
 
     def _refuse_either(self, group: Sequence[Picked], found: "Finding") -> None:
         """Refuse a table whose values fit two units alike."""
@@ -618,24 +618,24 @@ class _Guess:
 
     def _angle(self, angles: tuple[Picked, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
         """Return the unit of angles, what states it, and what is assumed."""
-        stated = next((one for one in angles if one.unit), None)
-        names = ", ".join(one.name for one in angles)
-        found = _angle_unit(angles[0].column.values, integer=angles[0].column.integer)
+        stated = next((angle for angle in angles if angle.unit), None)
+        names = ", ".join(angle.name for angle in angles)
+        finding = _angle_unit(angles[0].column.values, integer=angles[0].column.integer)
         if stated and stated.unit:
             unit = stated.unit
-            unstated = [one for one in angles if one.unit is None]
+            unstated = [angle for angle in angles if angle.unit is None]
             if unstated and unit.name not in ("rad", "deg"):
                 self._refuse_either(unstated, Finding(unit, False, f"values beside {stated.name}", _unit("deg")))
-            if self.of_table or not _implausible(angles[0], unit, found):
+            if self.of_table or not _implausible(angles[0], unit, finding):
                 return unit, stated.why, None
-            but = f"although the values look like {found.unit.name}: {found.why}"
+            but = f"although the values look like {finding.unit.name}: {finding.why}"
             text = f"{_are(names)} taken as {unit.name} ({stated.why}), {but}"
             return unit, stated.why, self._about_units("angle-unit", text, angles, unit)
-        if found.certain and not (self.of_table and found.unit.name == "rad"):
-            return found.unit, found.why, None
-        self._refuse_either(angles, found)
-        text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the {self.noun} does not state the unit"
-        return found.unit, "assumed", self._about_units("angle-unit", text, angles, found.unit)
+        if finding.certain and not (self.of_table and finding.unit.name == "rad"):
+            return finding.unit, finding.why, None
+        self._refuse_either(angles, finding)
+        text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
+        return finding.unit, "assumed", self._about_units("angle-unit", text, angles, finding.unit)
 
     def _azimuth_sign(self, azimuth: Picked, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
         side = positive_side(azimuth.column.comment)
@@ -687,8 +687,8 @@ class _Guess:
 
     def noise(self, plan: ColumnPlan) -> ColumnPlan:
         """Add the standard deviations of range and angles."""
-        found = [self.chosen.sigma.get(name) for name in _POLAR]
-        if not any(found) or not (plan.polar or self.of_table):
+        pickeds = [self.chosen.sigma.get(name) for name in _POLAR]
+        if not any(pickeds) or not (plan.polar or self.of_table):
             return plan
         base = _unit("deg" if plan.degrees else "rad").scale
         usual = (
@@ -696,16 +696,19 @@ class _Guess:
             if plan.polar
             else plan.claimed_scales
         )
-        own = [(one.unit.scale if one and one.unit else scale) for one, scale in zip(found, usual, strict=True)]
+        own = [
+            (picked.unit.scale if picked and picked.unit else scale)
+            for picked, scale in zip(pickeds, usual, strict=True)
+        ]
         assumed = []
-        for name, one, scale in zip(_POLAR, found, own, strict=True):
+        for name, one, scale in zip(_POLAR, pickeds, own, strict=True):
             if one and not one.unit and self.of_table:
                 unit = next((unit for unit in units_for(name) if math.isclose(unit.scale, scale)), units_for(name)[0])
                 text = f"{one.name} is taken as {unit.name}; the file does not state the unit"
                 assumed.append(_assume("noise-unit", text, _map(one, unit, f"sigma_{name}"), (f"sigma_{name}",)))
         return replace(
             plan,
-            sigma=_three([one.name if one else None for one in found], None),
+            sigma=_three([picked.name if picked else None for picked in pickeds], None),
             sigma_scales=(own[0], own[1] / base, own[2] / base),
             assumptions=(*plan.assumptions, *assumed),
         )
@@ -722,19 +725,17 @@ class _Guess:
         in_ros_frame = self.rules == "ros" and plan.scales[0] == 1.0
         others = ("vx", "vy", "vz") if self.of_table else ()
         speeds = (*group, *(self.picked[name] for name in others if name in self.picked))
-        stated = next((one for one in speeds if one.unit), None)
+        stated = next((speed for speed in speeds if speed.unit), None)
         assumptions = plan.assumptions
         if stated and stated.unit:
             unit, why = stated.unit, stated.why
         elif in_ros_frame or all(one.column.standard for one in group):
             unit, why = _unit("mps"), _ROS
         else:
-            found = _speed_unit(group[0].column.values, integer=group[0].column.integer)
-            unit, why = found.unit, "assumed"
+            finding = _speed_unit(group[0].column.values, integer=group[0].column.integer)
+            unit, why = finding.unit, "assumed"
             confirm = _map(group[0], unit) if doppler and unit.flag else CONFIRM_ALL
-            text = (
-                f"{_are(', '.join(names))} taken as {unit.name} ({found.why}); the {self.noun} does not state the unit"
-            )
+            text = f"{_are(', '.join(names))} taken as {unit.name} ({finding.why}); the {self.noun} does not state the unit"
             assumptions = (*assumptions, _assume("speed-unit", text, confirm, ("doppler",)))
         quantity, sign = ("doppler", "either: only its size matters") if doppler else ("velocity", "as the position's")
         return replace(

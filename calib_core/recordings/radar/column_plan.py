@@ -283,17 +283,19 @@ class ColumnPlan:
         if axes.degrees is not None:
             scales = (scales[0], math.copysign(1.0, scales[1]), math.copysign(1.0, scales[2])) if self.polar else scales
             unit = "deg" if axes.degrees else "rad"
-            readings = tuple(one.stated(unit=unit) if one.quantity in _ANGLES else one for one in readings)
+            readings = tuple(
+                reading.stated(unit=unit) if reading.quantity in _ANGLES else reading for reading in readings
+            )
         if axes.directed:
             sides = dict(zip("xyz", axes.directions, strict=True))
-            readings = tuple(one.stated(sign=sides.get(one.quantity, one.sign)) for one in readings)
+            readings = tuple(reading.stated(sign=sides.get(reading.quantity, reading.sign)) for reading in readings)
         return replace(
             self,
             axes=axes,
             scales=scales,
             readings=readings,
             degrees=self.degrees if axes.degrees is None else axes.degrees,
-            assumptions=tuple(one for one in self.assumptions if not one.settled_by(axes)),
+            assumptions=tuple(assumption for assumption in self.assumptions if not assumption.settled_by(axes)),
         )
 
 
@@ -411,8 +413,10 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     if "amplitude" in given:
         made = replace(made, amplitude=given["amplitude"].column, amplitude_scale=given["amplitude"].scale)
     made = _sigma(made, given)
-    kept = tuple(one for one in start.assumptions if not _settled(one, given, made))
-    readings = tuple(one for one in start.readings if one.quantity not in given and not _replaced(one, made))
+    kept = tuple(assumption for assumption in start.assumptions if not _settled(assumption, given, made))
+    readings = tuple(
+        reading for reading in start.readings if reading.quantity not in given and not _replaced(reading, made)
+    )
     return replace(
         made,
         mapped=tuple(one.words for one in column_map),

@@ -367,11 +367,11 @@ def _fault(added: Decoder, known: Iterable[Decoder]) -> str:
         return f"has the unknown kind {added.kind!r}; known: {', '.join(get_args(MessageKind))}"
     if not added.polar and plan_columns(added.fields) is None:
         return "has no position: its fields have neither x, y, z nor a range and an azimuth, and it has no polar"
-    for one in known:
-        if one.name == added.name:
+    for decoder in known:
+        if decoder.name == added.name:
             return "has the same name as another layout"
-        if one.kind == added.kind and _folded(one.fields) == _folded(added.fields):
-            return f"is recognised by the same fields as {one.name!r}; it needs one more field to differ"
+        if decoder.kind == added.kind and _folded(decoder.fields) == _folded(added.fields):
+            return f"is recognised by the same fields as {decoder.name!r}; it needs one more field to differ"
     return ""
 
 

@@ -201,18 +201,18 @@ def _all_together(figures: Sequence[Figures]) -> Figures:
     """Return the figures of several topics that show different returns of one radar."""
     if len(figures) == 1:
         return figures[0]
-    rates = [one.rate_hz for one in figures if one.rate_hz is not None]
-    counts = [one.returns_per_scan for one in figures]
-    static = [one.static_share for one in figures]
+    rates = [figure.rate_hz for figure in figures if figure.rate_hz is not None]
+    counts = [figure.returns_per_scan for figure in figures]
+    static = [figure.static_share for figure in figures]
     weighed = [share * count for share, count in zip(static, counts, strict=True) if share is not None]
     return Figures(
         returns_per_scan=sum(counts),
         rate_hz=max(rates, default=None),
-        doppler=any(one.doppler for one in figures),
+        doppler=any(figure.doppler for figure in figures),
         static_share=sum(weighed) / max(sum(counts), 1e-9) if weighed else None,
-        ahead_per_scan=sum(one.ahead_per_scan for one in figures),
-        nearest_m=min(one.nearest_m for one in figures),
-        farthest_m=max(one.farthest_m for one in figures),
+        ahead_per_scan=sum(figure.ahead_per_scan for figure in figures),
+        nearest_m=min(figure.nearest_m for figure in figures),
+        farthest_m=max(figure.farthest_m for figure in figures),
     )
 
 

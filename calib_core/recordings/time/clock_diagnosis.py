@@ -132,7 +132,7 @@ def diagnose(
         one_per_return: every message is a single radar return.
         times_from: where the times of files come from; "" for messages.
     """
-    found = ClockDiagnosis(
+    diagnosis = ClockDiagnosis(
         stamps.topic,
         chosen,
         _reason(stamps, chosen, requested),
@@ -141,18 +141,18 @@ def diagnose(
         one_per_return=one_per_return,
         times_from=times_from,
     )
-    found = _with_rhythm(found, times_ns)
+    diagnosis = _with_rhythm(diagnosis, times_ns)
     if stamps.header_ns is None or not len(stamps.header_ns):
-        return found
-    found = _with_order(found, stamps.header_ns)
+        return diagnosis
+    diagnosis = _with_order(diagnosis, stamps.header_ns)
     if receive_fault(stamps) is not None:
-        return found
-    found = _with_delay(found, stamps.header_ns, stamps.receive_ns)
-    if chosen == "header" and requested == "auto" and (found.jumps or found._drifts):
+        return diagnosis
+    diagnosis = _with_delay(diagnosis, stamps.header_ns, stamps.receive_ns)
+    if chosen == "header" and requested == "auto" and (diagnosis.jumps or diagnosis._drifts):
         return replace(
-            found, reason="the stamps are in order, although they jump or drift relative to the receive times"
+            diagnosis, reason="the stamps are in order, although they jump or drift relative to the receive times"
         )
-    return found
+    return diagnosis
 
 
 def _reason(stamps: Stamps, chosen: str, requested: Clock) -> str:
@@ -233,23 +233,23 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
 def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
     """Warn about clock problems that can degrade a calibration."""
     warnings = []
-    for one in found:
-        by_stamps = one.chosen == "header"
-        if by_stamps and one.jumps:
+    for clock in found:
+        by_stamps = clock.chosen == "header"
+        if by_stamps and clock.jumps:
             warnings.append(
                 DataWarning.reported(
                     "clock-jumps",
-                    f"the stamps of {one.topic} jump relative to the receive times, {_counted(one.jumps, 'time', 'times')} "
-                    f"and by up to {span_text(one.largest_jump_s)}: its clock was set during the recording, or the driver hung",
+                    f"the stamps of {clock.topic} jump relative to the receive times, {_counted(clock.jumps, 'time', 'times')} "
+                    f"and by up to {span_text(clock.largest_jump_s)}: its clock was set during the recording, or the driver hung",
                     "compare with --clock receive, and keep only the clicks before or after the jump",
                 )
             )
-        if by_stamps and abs(one.drift_s) > _DRIFT_S:
+        if by_stamps and abs(clock.drift_s) > _DRIFT_S:
             warnings.append(
                 DataWarning.reported(
                     "clock-drift",
-                    f"the stamps of {one.topic} drift relative to the receive times by {abs(one.drift_s) * 1e3:.0f} ms in total "
-                    f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not synchronised with the recorder's",
+                    f"the stamps of {clock.topic} drift relative to the receive times by {abs(clock.drift_s) * 1e3:.0f} ms in "
+                    f"total ({abs(clock.drift_ppm or 0):.0f} ppm): its clock is not synchronised with the recorder's",
                     "synchronise the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )

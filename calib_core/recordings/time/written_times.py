@@ -164,8 +164,8 @@ def time_from_name(stem: str) -> TimeNs | None:
 
     If a name has several numbers, the last one that is a time between 2001 and 2100 is used.
     """
-    found = epoch_in_name(stem)
-    return found.time if found is not None else None
+    moment = epoch_in_name(stem)
+    return moment.time if moment is not None else None
 
 
 def epoch_in_name(stem: str) -> WrittenMoment | None:

@@ -193,7 +193,9 @@ class FrameRenderer:
     def _draw_limbs(self, levels: np.ndarray, limbs: tuple[Capsule, ...]) -> None:
         """Draw limbs into the image, farthest first, hidden by nearer parts of the backdrop."""
         still, pixel_rad = self.still, 1.0 / float(self.rig.camera.matrix_px[0, 0])
-        for limb in sorted(limbs, key=lambda one: -float(np.linalg.norm(one.start_m + one.end_m - 2.0 * still.eye_m))):
+        for limb in sorted(
+            limbs, key=lambda limb: -float(np.linalg.norm(limb.start_m + limb.end_m - 2.0 * still.eye_m))
+        ):
             window = self._window(_outline(limb))
             if window is None:
                 continue

@@ -212,8 +212,8 @@ class _Room:
     def that_fit(self, batch: Points3, taken: Sequence[Vector3]) -> Iterator[Vector3]:
         """Yield those of some positions (n, 3) that all cameras see, clear of the solids and of what is taken by then."""
         whole = in_sight(self.added, batch)
-        for one in self.rigs:
-            whole &= _in_image(one, batch)
+        for rig in self.rigs:
+            whole &= _in_image(rig, batch)
         if self.scene.board is not None:
             whole &= ~self.scene.board.hides(batch)
         for position in batch[whole]:
@@ -274,7 +274,7 @@ def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions)
     if options.clutter == "none":
         return ()
     louder_db = options.surroundings.clutter_db
-    visible = tuple(replace(one, rcs_dbsm=one.rcs_dbsm + louder_db) for one in scene.scatterers)
+    visible = tuple(replace(scatterer, rcs_dbsm=scatterer.rcs_dbsm + louder_db) for scatterer in scene.scatterers)
     if options.clutter == "scene":
         return visible
     reach = min(scene.layout.max_lateral_m + 0.4, 7.0)
@@ -325,14 +325,14 @@ class SimulatedPlacement:
 
 def placements_of(stage: Stage) -> tuple[SimulatedPlacement, ...]:
     """Return the truth about every placement."""
-    found: list[SimulatedPlacement] = []
+    placements: list[SimulatedPlacement] = []
     for resting in stage.story.restings:
         point = (stage.rig.radar_from_world @ resting.position_m[None])[0]
         pixel = stage.rig.camera.project(stage.rig.camera_from_radar @ point[None])[0]
         start, end = stage.recorded_span(resting.start_s, resting.end_s)
-        best = _best_frame(stage, resting, [placement.best_image_time for placement in found])
-        found.append(SimulatedPlacement(f"placement-{resting.index + 1:02d}", start, end, point, pixel, best))
-    return tuple(found)
+        best = _best_frame(stage, resting, [placement.best_image_time for placement in placements])
+        placements.append(SimulatedPlacement(f"placement-{resting.index + 1:02d}", start, end, point, pixel, best))
+    return tuple(placements)
 
 
 def _best_frame(stage: Stage, resting: Resting, taken: list[TimeNs]) -> TimeNs:

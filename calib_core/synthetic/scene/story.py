@@ -185,7 +185,11 @@ class Story:
         moment = self._moment(time_s) if self.restings else Moment(_NOBODY, np.zeros(3), 0.0, None, 0.0)
         if time_s < self.lead_s:
             moment = replace(moment, reflector_m=_BEHIND_SENSORS_M, resting=None)
-        standing = (one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting)
+        standing = (
+            resting
+            for resting in self.restings
+            if resting.start_s <= time_s < resting.end_s and resting is not moment.resting
+        )
         passing = (state for one in self.passers_by if (state := one.at(time_s)) is not None)
         traffic = (mover.at(time_s) for mover in self.movers)
         return replace(moment, standing=tuple(standing), passers_by=tuple(passing), traffic=tuple(traffic))

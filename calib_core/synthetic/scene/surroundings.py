@@ -63,7 +63,7 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
     if surroundings.fence:
         side = 1.0 if rng.uniform() < 0.5 else -1.0
         solids += _fence(side)
-        scatterers += [Scatterer((one.x_m, one.y_m, 0.6), _POST_DBSM) for one in solids if one.is_round]
+        scatterers += [Scatterer((solid.x_m, solid.y_m, 0.6), _POST_DBSM) for solid in solids if solid.is_round]
     for _ in range(surroundings.parked_cars):
         parts, echoes = _car(rng, replace(scene, solids=(*scene.solids, *solids)))
         solids += parts

@@ -117,8 +117,8 @@ def _sensitivity(figures: BoxFigures) -> Markup:
             drawing("Not computed", text(160, 88, "not computed", class_="middle")),
             "Not computed.",
         )
-    least, most = min(one.angles_deg[0] for one in curves), max(one.angles_deg[-1] for one in curves)
-    values = [value for one in curves for value in one.acc if np.isfinite(value)]
+    least, most = min(curve.angles_deg[0] for curve in curves), max(curve.angles_deg[-1] for curve in curves)
+    values = [value for curve in curves for value in curve.acc if np.isfinite(value)]
     high = min(1.05, 1.1 * max(values, default=1.0) + 0.01)
     axes = Axes(least, most, 0.0, high)
     lines: list[Child] = []
@@ -140,13 +140,13 @@ def _sensitivity(figures: BoxFigures) -> Markup:
 def _sensitivity_words(curves: Sequence[Sensitivity]) -> str:
     """Say for each axis how much Acc changes within one degree, and where it is highest if that is not at 0."""
     parts = []
-    for one in curves:
-        angles, values = np.array(one.angles_deg), np.array(one.acc)
+    for curve in curves:
+        angles, values = np.array(curve.angles_deg), np.array(curve.acc)
         near = values[np.abs(angles) <= 1.0 + 1e-9]
         best = float(angles[int(np.nanargmax(values))]) if np.isfinite(values).any() else 0.0
         off = f", highest at {best:+.2g} deg" if best != 0 and values.max() > values[np.argmin(np.abs(angles))] else ""
         change = f"{100.0 * float(np.ptp(near)):.1f} points" if len(near) and np.isfinite(near).all() else "unknown"
-        parts.append(f"{one.axis} {change}{off}")
+        parts.append(f"{curve.axis} {change}{off}")
     return f"Change of Acc within ±1 deg: {'; '.join(parts)}."
 
 

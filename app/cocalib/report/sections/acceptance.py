@@ -78,12 +78,12 @@ def _table(limits: tuple[Limit, ...]) -> Markup:
     body = (
         tag(
             "tr",
-            tag("th", _WORDS[one.name], scope="row"),
-            tag("td", f"{one.limit:g} {_UNITS[one.name]}"),
-            tag("td", f"{one.stated:g} {_UNITS[one.name]}" if one.stated == one.stated else "not stated"),
-            tag("td", tag("b", "pass" if one.met else "FAIL")),
+            tag("th", _WORDS[limit.name], scope="row"),
+            tag("td", f"{limit.limit:g} {_UNITS[limit.name]}"),
+            tag("td", f"{limit.stated:g} {_UNITS[limit.name]}" if limit.stated == limit.stated else "not stated"),
+            tag("td", tag("b", "pass" if limit.met else "FAIL")),
         )
-        for one in limits
+        for limit in limits
     )
     heads = ("stated error, 95 %", "limit", "stated", "")
     head = tag("thead", tag("tr", *(tag("th", name, scope="col") if name else tag("td") for name in heads)))

@@ -80,9 +80,9 @@ def _judgement(subject: ReportSubject) -> tuple[str, str, str, str]:
             "and report it with that recording",
             "",
         )
-    found = stated if stated is not None else stated_verdict(verdict_on(calibration))
-    reason = f"to {found.reason}" if found.level in ("good", "usable") else found.reason
-    return found.level, reason, found.action, found.assumes
+    verdict = stated if stated is not None else stated_verdict(verdict_on(calibration))
+    reason = f"to {verdict.reason}" if verdict.level in ("good", "usable") else verdict.reason
+    return verdict.level, reason, verdict.action, verdict.assumes
 
 
 def _transforms(subject: ReportSubject) -> tuple[Markup, Markup]:
@@ -138,17 +138,19 @@ def _no_camera() -> Markup:
 def _error_bars(calibration: Calibration) -> Markup:
     heading = tag("h3", "Mounting and its error")
     if not np.isfinite(calibration.covariance).all():
-        shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "°")]
+        shown = [figure for figure in pose_figures(calibration) if figure.unit in ("cm", "°")]
         return tag(
             "div",
             heading,
             _table(("camera", ""), [(one.label, f"{one.value} {one.unit}") for one in shown]),
             tag("p", "No error bars: this calibration states no covariance.", class_="note"),
         )
-    shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "°") and one.key != "radar_angles"]
+    shown = [
+        figure for figure in pose_figures(calibration) if figure.unit in ("cm", "°") and figure.key != "radar_angles"
+    ]
     keys = [one.key for one in shown]
     rows = [(one.name, f"{one.value} {one.unit}") for one in shown]
-    assumed = ", ".join(f"{one.label} {one.value} {one.unit}" for one in assumed_figures(calibration))
+    assumed = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed_figures(calibration))
     return tag(
         "div",
         heading,
@@ -213,7 +215,7 @@ def _figures(calibration: Calibration) -> Markup:
             tag("p", "The file contains no pairs: residuals need a recording with clicks.", class_="note"),
         )
     metrics = calibration.metrics
-    rows = [(one.name, f"{one.value} {one.unit}".strip()) for one in metric_figures(calibration)]
+    rows = [(figure.name, f"{figure.value} {figure.unit}".strip()) for figure in metric_figures(calibration)]
     if np.isfinite(metrics.chi2) and metrics.degrees_of_freedom:
         rows.append(("chi2 / degrees of freedom", f"{plain(metrics.chi2)} / {metrics.degrees_of_freedom}"))
     if np.isfinite(metrics.picture_sigma_px):

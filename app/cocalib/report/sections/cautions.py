@@ -15,11 +15,11 @@ _SIGNS = {"contradictory": "✕", "coarse": "▲", "limited": "△", "note": "·
 
 def cautions(subject: ReportSubject) -> Markup:
     """Return the warnings, gravest first, then the rest."""
-    found = list(_all_warnings(subject))
-    items = [_item(one) for one in found[:_MOST]]
-    if len(found) > _MOST:
-        codes = ", ".join(dict.fromkeys(one.code for one in found[_MOST:]))
-        items.append(tag("li", f"{len(found) - _MOST} more: {codes}."))
+    warnings = list(_all_warnings(subject))
+    items = [_item(warning) for warning in warnings[:_MOST]]
+    if len(warnings) > _MOST:
+        codes = ", ".join(dict.fromkeys(warning.code for warning in warnings[_MOST:]))
+        items.append(tag("li", f"{len(warnings) - _MOST} more: {codes}."))
     unpaired = subject.calibration.unpaired if subject.calibration is not None else ()
     items += [
         tag("li", _sign("·"), tag("b", f"{row.id} has no pair. "), str(in_sentences(row)))
@@ -43,10 +43,10 @@ def _all_warnings(subject: ReportSubject) -> Iterator[DataWarning]:
     judged = subject.judged.evaluation.warnings if subject.judged is not None else ()
     recorded = subject.recording.warnings if subject.recording is not None else ()
     seen: list[DataWarning] = []
-    for one in (*own, *judged, *recorded):
-        if one not in seen:
-            seen.append(one)
-            yield one
+    for warning in (*own, *judged, *recorded):
+        if warning not in seen:
+            seen.append(warning)
+            yield warning
 
 
 def _assumed(subject: ReportSubject) -> tuple[DataWarning, ...]:

@@ -12,7 +12,7 @@ def comparison(against: Against) -> Markup:
         against: the other calibration and the difference.
     """
     found = against.comparison
-    rows = (tag("tr", tag("th", one.label, scope="row"), tag("td", one.text)) for one in found.figures)
+    rows = (tag("tr", tag("th", figure.label, scope="row"), tag("td", figure.text)) for figure in found.figures)
     return tag(
         "section",
         tag("h2", f"Compared with {against.name}"),

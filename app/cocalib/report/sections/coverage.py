@@ -77,8 +77,8 @@ def _from_above(rows: ResidualRows) -> Markup:
     shapes: list[Child] = [
         polyline(
             [
-                (160.0 - scale * step_m * ring * np.sin(one), origin_y - scale * step_m * ring * np.cos(one))
-                for one in angles
+                (160.0 - scale * step_m * ring * np.sin(angle), origin_y - scale * step_m * ring * np.cos(angle))
+                for angle in angles
             ],
             class_="grid",
         )

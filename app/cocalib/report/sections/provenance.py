@@ -62,8 +62,8 @@ def _files(subject: ReportSubject) -> list[tuple[str, InputFile]]:
     )
     roles: dict[InputFile, list[str]] = {}
     for role, files in parts:
-        for one in files:
-            roles.setdefault(one, []).append(role)
+        for file in files:
+            roles.setdefault(file, []).append(role)
     return [(", ".join(dict.fromkeys(names)), one) for one, names in roles.items()]
 
 
@@ -92,7 +92,10 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
             ("options", _options(file.calibration.options)),
             ("made from", made_from if (made_from := file.made_from_sha256) else None),
         )
-        yield from (("assumed" if not one.confirmed else "confirmed", sentence(one.text)) for one in made.assumptions)
+        yield from (
+            ("assumed" if not assumption.confirmed else "confirmed", sentence(assumption.text))
+            for assumption in made.assumptions
+        )
     if subject.calibration is not None:
         yield "lens", _lens(subject.calibration.camera)
         if subject.calibration.given_camera is not None:

@@ -235,9 +235,9 @@ def repair_session(folder: Path) -> Repair:
     lock: FolderLock | None = None
     try:
         lock = FolderLock(guarded)
-        found = _contents(guarded)
-        backups = rewrite(guarded, found) if found.faults else ()
-        return _repair(folder, found, backups)
+        contents = _contents(guarded)
+        backups = rewrite(guarded, contents) if contents.faults else ()
+        return _repair(folder, contents, backups)
     except OSError as error:
         raise SessionFileError(f"{folder}: cannot be repaired: {error.strerror}") from error
     finally:
@@ -248,12 +248,12 @@ def repair_session(folder: Path) -> Repair:
 
 def _contents(folder: GuardedFolder) -> Contents:
     try:
-        found = read_contents(folder)
+        contents = read_contents(folder)
     except OSError as error:
         raise SessionFileError(f"{folder.path}: cannot be read: {error.strerror}") from error
-    if found is None:
+    if contents is None:
         raise SessionFileError(f"{folder.path}: holds no session; give a folder whose name ends in .cocalib-session")
-    return found
+    return contents
 
 
 def _repair(folder: Path, found: Contents, backups: tuple[str, ...] = ()) -> Repair:

@@ -267,9 +267,9 @@ def _summary(path: Path) -> SessionSummary:
             holder = lock_holder(folder)
         finally:
             folder.close()
-        found = inspect_session(path)
+        repair = inspect_session(path)
     except (SessionFileError, OSError) as error:
         return SessionSummary(path, "", 0, 0, changed, "unreadable", str(error))
-    state = "open" if holder else "damaged" if found.faults else "torn" if found.torn_bytes else "sound"
-    about = "; ".join(filter(None, (holder, *found.faults, found.torn)))
-    return SessionSummary(path, found.recording, len(found.clicks), found.steps, changed, state, about)
+    state = "open" if holder else "damaged" if repair.faults else "torn" if repair.torn_bytes else "sound"
+    about = "; ".join(filter(None, (holder, *repair.faults, repair.torn)))
+    return SessionSummary(path, repair.recording, len(repair.clicks), repair.steps, changed, state, about)

@@ -207,23 +207,23 @@ def set_aside(folder: Path) -> Path | None:
 def _opened(
     folder: GuardedFolder, lock: FolderLock, facts: RecordingFacts, warnings: tuple[DataWarning, ...]
 ) -> SessionFile:
-    found = read_contents(folder, facts)
-    if found is None:
+    contents = read_contents(folder, facts)
+    if contents is None:
         lines: tuple[SealedLine, ...] = (first_line(recording_form(facts), cocalib=version()),)
         folder.replace(JOURNAL, bytes_of(lines))
         restored = Restored(folder.path, History(), warnings=warnings)
     else:
-        lines = found.lines
-        about = (*warnings, *_about(found, facts, folder))
-        if not found.is_written:
-            rewrite(folder, found)
-        elif found.faults:
+        lines = contents.lines
+        about = (*warnings, *_about(contents, facts, folder))
+        if not contents.is_written:
+            rewrite(folder, contents)
+        elif contents.faults:
             folder.back_up(COPY)
-        torn = found.torn_bytes if found.is_written else 0
-        restored = Restored(folder.path, found.history, len(lines) - 1, torn, about)
+        torn = contents.torn_bytes if contents.is_written else 0
+        restored = Restored(folder.path, contents.history, len(lines) - 1, torn, about)
     journal = Journal(folder, lines)
     opened = SessionFile(folder, lock, journal, restored, facts.name)
-    if found is not None and found.stated_axes != facts.radar_axes:
+    if contents is not None and contents.stated_axes != facts.radar_axes:
         with suppress(SessionFileError):  # on a full disk, the next opening warns again
             journal.append(AxesStated(facts.radar_axes))
     return opened

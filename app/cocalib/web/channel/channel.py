@@ -264,8 +264,8 @@ class Channel:
         self._has_candidates = cursor.selected is not None
         session = self._hub.workspace.session
         find = partial(candidates_of, session, cursor.selected, self._hub.recording)
-        found = await asyncio.get_running_loop().run_in_executor(self._hub.executor, find)
-        self.outbox.put(encode(found), kind="candidates")
+        candidates = await asyncio.get_running_loop().run_in_executor(self._hub.executor, find)
+        self.outbox.put(encode(candidates), kind="candidates")
 
     async def _draw_space(self, cursor: CursorMoved) -> None:
         """Draw the 3D view, and send what the page draws over it."""
@@ -310,7 +310,7 @@ def _further(session: Session, click: ReflectorClick, recording: RadarSource) ->
     """Return more returns of the window for a click that does not agree with the others."""
     if not isinstance(session.outcome, Calibration):
         return ()
-    result = next(one for one in session.outcome.pairs if one.id == click.id)
+    result = next(pair for pair in session.outcome.pairs if pair.id == click.id)
     if result.inlier or not result.outlier_probability > 0.0:
         return ()
     try:

@@ -242,8 +242,9 @@ def _settled(recording: Recording) -> list[DataWarning]:
 def _readings(recording: Recording) -> tuple[str, ...]:
     """Say what was taken for what in the radar's messages, one quantity a line, and what else they hold."""
     rows = [
-        f"{one.quantity} from {one.column}{f' [{one.unit}]' if one.unit else ''}{f', {one.sign}' if one.sign else ''} ({one.why})"
-        for one in recording.radar_columns
+        f"{column.quantity} from {column.column}"
+        f"{f' [{column.unit}]' if column.unit else ''}{f', {column.sign}' if column.sign else ''} ({column.why})"
+        for column in recording.radar_columns
     ]
     return (*rows, *recording.radar_notes)
 

@@ -244,7 +244,7 @@ def lens_result(number: int, lens: CalibratedLens, about: str) -> LensResult:
             LensViewRow(view.corners.index, view.corners.name, view.rms_px, view.held_out_rms_px) for view in views
         ),
         left_out=lens.left_out,
-        trials=tuple(_trial(one, lens.camera.model) for one in lens.trials),
+        trials=tuple(_trial(trial, lens.camera.model) for trial in lens.trials),
         warnings=tuple(map(warning_row, lens.warnings)),
         residuals=_residuals(lens.views),
         pattern=residuals_text(residual_field(lens)) if lens.views else "",

@@ -134,7 +134,7 @@ class LiveEdge:
         survey = await self._in_thread(self._search)
         self._surveyed_at = time.monotonic()
         self._survey_took_s = self._surveyed_at - started
-        self._placements = np.array([one.position_radar_m for one in survey.placements]).reshape(-1, 3)
+        self._placements = np.array([placement.position_radar_m for placement in survey.placements]).reshape(-1, 3)
         self._pages.surveyed(survey)
 
     def _searched(self, task: "asyncio.Task[None]") -> None:

@@ -79,7 +79,11 @@ class ProposingDesk:
 
     def surveyed(self, placements: tuple[Placement, ...]) -> None:
         """Propose for these placements from now on."""
-        long = [number for number, one in enumerate(placements) if one.end - one.start >= _SHORTEST_S * NS_PER_S]
+        long = [
+            number
+            for number, placement in enumerate(placements)
+            if placement.end - placement.start >= _SHORTEST_S * NS_PER_S
+        ]
         found = tuple(placements[number] for number in long)
         if self._placements is None or _times(found) != _times(self._placements):
             self._numbers, self._placements = tuple(long), found
@@ -94,7 +98,9 @@ class ProposingDesk:
         if len(asked) == len(self._asked) and all(one is old for one, old in zip(asked, self._asked, strict=True)):
             return
         self._asked = asked
-        gone = frozenset(number for number, one in enumerate(self._placements) if is_dismissed(one, session))
+        gone = frozenset(
+            number for number, placement in enumerate(self._placements) if is_dismissed(placement, session)
+        )
         self._job.ask(ProposingWish(camera, session.options, self._placements, session.clicks, gone))
 
     async def averaged(self, wanted: SnapWanted) -> Snapped:
@@ -114,12 +120,12 @@ class ProposingDesk:
         view = view_at(wanted.image_time, pixel_px, self._job.snapshot.views)
         if frame is None or view is None:
             return Snapped(None, None, "The images of this placement were not looked at.", wanted.id)
-        found = averaged_over_dwell(view, self._recording, frame, pixel_px)
-        if found is None:
+        average = averaged_over_dwell(view, self._recording, frame, pixel_px)
+        if average is None:
             return Snapped(None, None, "The images of this placement show no apex there.", wanted.id)
-        column, row = (float(value) for value in found.pixel_px)
-        words = f"Averaged over {found.frames} frames, with a standard deviation of {found.sigma_px:.2f} px."
-        return Snapped((column, row), found.sigma_px, words, wanted.id)
+        column, row = (float(value) for value in average.pixel_px)
+        words = f"Averaged over {average.frames} frames, with a standard deviation of {average.sigma_px:.2f} px."
+        return Snapped((column, row), average.sigma_px, words, wanted.id)
 
     def switch(self, switch: ProposingSwitch) -> None:
         """Propose, or propose nothing any more."""
@@ -180,8 +186,11 @@ class ProposingDesk:
     def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
         view: DwellView = next(one for one in now.views if one.placement is proposal.placement)
         places = tuple(
-            ProposalPlace((round(one.pixel_px[0].item(), 3), round(one.pixel_px[1].item(), 3)), round(one.sigma_px, 3))
-            for one in proposal.candidates
+            ProposalPlace(
+                (round(candidate.pixel_px[0].item(), 3), round(candidate.pixel_px[1].item(), 3)),
+                round(candidate.sigma_px, 3),
+            )
+            for candidate in proposal.candidates
         )
         return ProposalRow(
             placement=placement,
@@ -195,4 +204,4 @@ class ProposingDesk:
 
 
 def _times(placements: tuple[Placement, ...]) -> list[tuple[int, int]]:
-    return [(int(one.start), int(one.end)) for one in placements]
+    return [(int(placement.start), int(placement.end)) for placement in placements]

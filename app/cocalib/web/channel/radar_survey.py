@@ -185,8 +185,10 @@ class GrowingSurvey:
         Args:
             moments: (m,) stamps of the frames [ns], ascending.
         """
-        found = find_placements(self._static, self._options, min_dwell_s=SHORTEST_S)
-        new = [(one, row) for one in found if (row := _row(one, moments, self._static)) is not None]
+        placements = find_placements(self._static, self._options, min_dwell_s=SHORTEST_S)
+        new = [
+            (placement, row) for placement in placements if (row := _row(placement, moments, self._static)) is not None
+        ]
         seen = [*self._settled, *new]
         if len(self._static.points_radar_m) > MOST_STATIC_RETURNS:
             self._settled, self._static = seen, RadarScans()

@@ -199,6 +199,6 @@ class ReviewDesk:
             data = base64.b64decode(request.file_base64, validate=True)
         except binascii.Error as error:
             raise InputError(f"{name}: was not sent as base64: {error}") from None
-        found = read_clear(data, name)
-        self._read = request, Solution(name, found, adopted_calibration(found, name, camera=camera))
+        calibration = read_clear(data, name)
+        self._read = request, Solution(name, calibration, adopted_calibration(calibration, name, camera=camera))
         return self._read[1]

@@ -254,8 +254,8 @@ def _bytes(text: str) -> bytes:
 
 def _host_name(host: str) -> str:
     """Return a Host header without its port; the whole of one that has more than a name and a port."""
-    found = _HOST.fullmatch(host)
-    return found[1] if found else host
+    match = _HOST.fullmatch(host)
+    return match[1] if match else host
 
 
 def is_address(name: str) -> bool:

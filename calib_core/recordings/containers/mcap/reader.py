@@ -221,15 +221,15 @@ class McapSource(ChunkedSource):
         Args:
             closed: whether the file ends properly; a scan without losses then needs no warning.
         """
-        found = scan_mcap(self.file)
-        self._private_bytes = found.private_bytes
-        self.chunks, self.channels, self.recovered = found.chunks, found.declarations.channels, True
+        mcap = scan_mcap(self.file)
+        self._private_bytes = mcap.private_bytes
+        self.chunks, self.channels, self.recovered = mcap.chunks, mcap.declarations.channels, True
         self.indexes = {}
-        self._found = {channel: [np.array(entries, dtype=np.int64)] for channel, entries in found.messages.items()}
+        self._found = {channel: [np.array(entries, dtype=np.int64)] for channel, entries in mcap.messages.items()}
         known = {channel.id for channel in self.channels}
-        count = sum(map(len, found.messages.values()))
-        unknown = sum(len(entries) for channel, entries in found.messages.items() if channel not in known)
-        sound = closed and found.ended and not (found.lost_bytes or found.damaged_chunks or unknown)
+        count = sum(map(len, mcap.messages.values()))
+        unknown = sum(len(entries) for channel, entries in mcap.messages.items() if channel not in known)
+        sound = closed and mcap.ended and not (mcap.lost_bytes or mcap.damaged_chunks or unknown)
         if not sound and count == unknown:
             raise self._damaged(len(MAGIC))
         self._note_indexes()
@@ -237,10 +237,10 @@ class McapSource(ChunkedSource):
             warning = about_recovery(
                 self.path,
                 messages=count,
-                lost_bytes=found.lost_bytes,
+                lost_bytes=mcap.lost_bytes,
                 tool="mcap recover",
-                damaged_chunks=found.damaged_chunks,
-                fault=found.fault,
+                damaged_chunks=mcap.damaged_chunks,
+                fault=mcap.fault,
                 unknown=unknown,
             )
             self.warnings = (*self.warnings, warning)

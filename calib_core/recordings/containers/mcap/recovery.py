@@ -75,11 +75,11 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
     Args:
         file: the file.
     """
-    found = FoundInMcap([Chunk(0, file.size_bytes, file.size_bytes, "")])
-    for part in parts_of_mcap(file, found):
+    mcap = FoundInMcap([Chunk(0, file.size_bytes, file.size_bytes, "")])
+    for part in parts_of_mcap(file, mcap):
         if not part.kind:
-            found.lost_bytes += part.end - part.place
-    return found
+            mcap.lost_bytes += part.end - part.place
+    return mcap
 
 
 def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:

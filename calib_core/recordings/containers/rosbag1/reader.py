@@ -103,12 +103,12 @@ class Rosbag1Source(ChunkedSource):
 
     def _recover(self, start: int, fault: RecordingError) -> None:
         """Index a bag with a missing or damaged index by scanning all of it."""
-        found = scan_bag(self.file, start)
+        bag = scan_bag(self.file, start)
         self.recovered = True
-        self.chunks = found.chunks
-        channels = channels_of(found)
+        self.chunks = bag.chunks
+        channels = channels_of(bag)
         self.channels = tuple(channels.values())
-        known = {number: entries for number, entries in found.messages.items() if number in channels}
+        known = {number: entries for number, entries in bag.messages.items() if number in channels}
         if not known:
             raise RecordingError(
                 f"{fault}; all of its {self.size_bytes} bytes were searched without finding a complete message"
@@ -117,14 +117,14 @@ class Rosbag1Source(ChunkedSource):
         for connection, entries in known.items():
             columns = np.array(entries, dtype=np.int64)
             self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
-        count = sum(map(len, found.messages.values()))
+        count = sum(map(len, bag.messages.values()))
         warning = about_recovery(
             self.path,
             messages=count,
-            lost_bytes=found.lost_bytes,
+            lost_bytes=bag.lost_bytes,
             tool="rosbag reindex",
-            damaged_chunks=found.damaged_chunks,
-            fault=found.fault,
+            damaged_chunks=bag.damaged_chunks,
+            fault=bag.fault,
             unknown=count - sum(map(len, known.values())),
         )
         self.warnings = (*self.file.warnings, warning)

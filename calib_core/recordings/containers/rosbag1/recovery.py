@@ -118,14 +118,14 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
         file: the bag.
         start: position of that record.
     """
-    found = FoundInBag([Chunk(0, file.size_bytes, file.size_bytes, "none")])
+    bag = FoundInBag([Chunk(0, file.size_bytes, file.size_bytes, "none")])
     stretch = FileStretch(file, 0, file.size_bytes)
-    for record in BagWalk(stretch, found, inside=False).records(start):
+    for record in BagWalk(stretch, bag, inside=False).records(start):
         if record.kind == _CHUNK:
-            scan_chunk(file, record, found)
-        elif record.kind not in _OTHER_KINDS and not note_record(stretch, record, 0, found):
-            found.lost_bytes += record.end - record.place
-    return found
+            scan_chunk(file, record, bag)
+        elif record.kind not in _OTHER_KINDS and not note_record(stretch, record, 0, bag):
+            bag.lost_bytes += record.end - record.place
+    return bag
 
 
 def scan_bag_further(file: FileBytes, place: int, found: FoundInBag) -> int:

@@ -290,7 +290,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _assumptions(columns: _Columns, topic: str) -> tuple[Assumption, ...]:
-    return tuple(replace(one.assumption, topic=topic) for one in columns.plan.assumptions)
+    return tuple(replace(assumption.assumption, topic=topic) for assumption in columns.plan.assumptions)
 
 
 def _values(table: Table, columns: _Columns, options: PlainOptions) -> np.ndarray:
@@ -371,17 +371,17 @@ def _points(columns: _Columns, values: np.ndarray) -> np.ndarray:
     """Return returns in SI units and the radar's axes as a structured array, one field per quantity."""
     places = {columns.names[place]: number for number, place in reversed(list(enumerate(columns.wanted)))}
     plan = columns.shown
-    found = returns_from(plan, lambda name: values[:, places[name]])
+    returns = returns_from(plan, lambda name: values[:, places[name]])
     height = plan.polar or len(plan.position) == 3
-    fields = dict(zip("xyz" if height else "xy", found.points_radar_m.T, strict=False))
-    if found.claimed_polar is not None:
-        fields |= {n: c for n, c, own in zip(_POLAR, found.claimed_polar.T, plan.claimed, strict=True) if own}
+    fields = dict(zip("xyz" if height else "xy", returns.points_radar_m.T, strict=False))
+    if returns.claimed_polar is not None:
+        fields |= {n: c for n, c, own in zip(_POLAR, returns.claimed_polar.T, plan.claimed, strict=True) if own}
     if plan.doppler or plan.velocity:
-        fields["doppler"] = found.doppler_mps
+        fields["doppler"] = returns.doppler_mps
     if plan.amplitude:
         meaning = table_meaning(plan.amplitude)
-        fields[meaning.kind if meaning and meaning.quantity == "amplitude" else "amplitude"] = found.snr_db
-    fields |= {f"sigma_{n}": c for n, c, own in zip(_POLAR, found.sigma_polar.T, plan.sigma, strict=True) if own}
+        fields[meaning.kind if meaning and meaning.quantity == "amplitude" else "amplitude"] = returns.snr_db
+    fields |= {f"sigma_{n}": c for n, c, own in zip(_POLAR, returns.sigma_polar.T, plan.sigma, strict=True) if own}
     points = np.empty(len(values), dtype=[(name, "<f8") for name in fields])
     for name, column in fields.items():
         points[name] = column
@@ -402,13 +402,13 @@ def _table_words(columns: _Columns, remarks: tuple[str, ...]) -> str:
     """Describe what was read and what was not, for the list of files."""
     plan = columns.plan
     renamed = [
-        f"{one.quantity} from {one.column}"
-        for one in plan.readings
-        if one.why.startswith("--map") or not _is_documented(one.column)
+        f"{reading.quantity} from {reading.column}"
+        for reading in plan.readings
+        if reading.why.startswith("--map") or not _is_documented(reading.column)
     ]
     shown = {why: [r for r in plan.readings if r.why == why] for why in dict.fromkeys(r.why for r in plan.readings)}
     by_values = [
-        f"{', '.join(one.column for one in rows)} in {rows[0].unit}: {why.removeprefix('unit: ').partition(';')[0]}"
+        f"{', '.join(row.column for row in rows)} in {rows[0].unit}: {why.removeprefix('unit: ').partition(';')[0]}"
         for why, rows in shown.items()
         if why.startswith("unit: ") and not why.startswith(("unit: name", "unit: assumed", "unit: --map"))
     ]

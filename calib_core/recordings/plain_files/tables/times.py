@@ -138,18 +138,16 @@ def choose_times(
     claims: dict[str, list[TimeColumn]] = {}
     foreign: list[tuple[str, str]] = []
     for place, written in enumerate(names):
-        found = None if written in taken else time_name(written)
-        if found is None:
+        name = None if written in taken else time_name(written)
+        if name is None:
             continue
         below = units[place].strip("[]() -") if place < len(units) else ""
-        unit = unit_of_word(found.unit or below)
-        if unit is None and found.quantity == "time" and (found.unit or below):
-            foreign.append((written, found.unit or below))
+        unit = unit_of_word(name.unit or below)
+        if unit is None and name.quantity == "time" and (name.unit or below):
+            foreign.append((written, name.unit or below))
             continue
-        flag = unit.flag if unit and unit.dimension == "time" and found.quantity == "time" else ""
-        claims.setdefault(found.quantity, []).append(
-            TimeColumn(place, written.strip(), found.quantity, flag, found.rank)
-        )
+        flag = unit.flag if unit and unit.dimension == "time" and name.quantity == "time" else ""
+        claims.setdefault(name.quantity, []).append(TimeColumn(place, written.strip(), name.quantity, flag, name.rank))
     time = _time_columns(claims, first_row)
     if not time and foreign:
         raise unknown_unit_error(foreign[0][0], "time", foreign[0][1])
@@ -169,12 +167,12 @@ def time_name(written: str) -> TimeName | None:
     """Recognise a column of times such as time_ns, header.stamp.sec or "Time [ms]"; None for any other."""
     text, unit = split_unit(written)
     words = _words(text)
-    found = _time(words) if unit else _with_time(words) or _time(words)
-    if found is None and not unit and len(words) == 2 and (found := _time(words[:1])) and found.quantity == "time":
-        unit = "" if found.rank else words[1]
-        found = found if unit else None
+    name = _time(words) if unit else _with_time(words) or _time(words)
+    if name is None and not unit and len(words) == 2 and (name := _time(words[:1])) and name.quantity == "time":
+        unit = "" if name.rank else words[1]
+        name = name if unit else None
     stated = unit_of_word(unit)
-    return replace(found, unit=stated.flag if stated else unit.lower()) if found and unit else found
+    return replace(name, unit=stated.flag if stated else unit.lower()) if name and unit else name
 
 
 def _words(text: str) -> tuple[str, ...]:
@@ -201,8 +199,8 @@ def _with_time(words: tuple[str, ...]) -> TimeName | None:
     if whole and whole.quantity not in ("sec", "nanosec"):
         return whole
     unit = unit_of_words(words[-1:]) if len(words) > 1 else None
-    found = _time(words[:-1]) if unit and unit.dimension == "time" else None
-    return TimeName("time", unit.flag, found.rank) if unit and found and found.quantity == "time" else None
+    name = _time(words[:-1]) if unit and unit.dimension == "time" else None
+    return TimeName("time", unit.flag, name.rank) if unit and name and name.quantity == "time" else None
 
 
 def _time_columns(claims: dict[str, list[TimeColumn]], first_row: Sequence[str]) -> tuple[TimeColumn, ...]:
@@ -307,8 +305,8 @@ def _of_two(columns: Sequence[TimeColumn], rows: Sequence[Sequence[str]], zone_s
 
 
 def _zoned(text: str) -> bool:
-    found = date_text(text)
-    return (found is not None and found.zoned) or text.endswith("Z") or "+" in text
+    moment = date_text(text)
+    return (moment is not None and moment.zoned) or text.endswith("Z") or "+" in text
 
 
 def _float(text: str) -> float | None:

@@ -182,11 +182,11 @@ class ListPlace:
 
     def parents(self, message: Message) -> list[Message]:
         """Return the messages that hold the list."""
-        found = [message]
+        messages = [message]
         for name, many in zip(self.path[:-1], self.lists[:-1], strict=True):
-            inner = (one for parent in found for one in (parent.messages(name) if many else [parent.message(name)]))
-            found = list(inner)
-        return found
+            inner = (one for parent in messages for one in (parent.messages(name) if many else [parent.message(name)]))
+            messages = list(inner)
+        return messages
 
 
 def struct_lists(definition: Definition) -> tuple[ListPlace, ...]:
