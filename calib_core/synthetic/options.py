@@ -103,6 +103,7 @@ class Surroundings:
     strong_target_dbsm: float | None = option(
         None,
         "Radar cross-section of one more permanent target, such as 29; by default there is none [dBsm].",
+        low=-60.0,
         high=60.0,
     )
     flickering_targets: int = option(
@@ -111,7 +112,9 @@ class Surroundings:
         low=0,
         high=40,
     )
-    passers_by: int = option(0, "Number of people who walk through the scene; every third stops on the way.", low=0)
+    passers_by: int = option(
+        0, "Number of people who walk through the scene; every third stops on the way.", low=0, high=100
+    )
     ghost_share: float = option(
         0.25, "Share of the placements with a reflection by way of the ground or a wall.", low=0.0, high=1.0
     )
@@ -144,7 +147,10 @@ class IntrinsicsErrors:
     published: bool = option(True, "Record the intrinsics; otherwise the recording says nothing about the lens.")
     focal_length_scale: float = option(1.0, "Published focal length over the true one.", low=0.5, high=2.0)
     principal_point_px: tuple[float, float] = option(
-        (0.0, 0.0), "How far right and down of the true one the published principal point is [px]."
+        (0.0, 0.0),
+        "How far right and down of the true one the published principal point is [px].",
+        low=-16384.0,
+        high=16384.0,
     )
 
 
@@ -184,7 +190,10 @@ class SimulationOptions:
     person: bool = option(True, "Have a person carry the reflector; otherwise it just appears at each placement.")
     camera_model: CameraModel = option("plumb_bob", "Lens model.")
     field_of_view_deg: float | None = option(
-        None, "Horizontal field of view before distortion [deg]; by default 75, or 110 for equidistant."
+        None,
+        "Horizontal field of view before distortion [deg]; by default 75, or 110 for equidistant.",
+        low=1.0,
+        high=170.0,
     )
     width_px: int = option(1280, "Image width in pixels.", low=64, high=16384)
     height_px: int = option(720, "Image height in pixels.", low=64, high=16384)
@@ -192,9 +201,9 @@ class SimulationOptions:
     radar_rate_hz: float = option(10.0, "Scans per second.", low=0.01, high=1000.0)
     jpeg_quality: int = option(85, "JPEG quality.", low=1, high=100)
     sensor_noise_grey: float = option(
-        0.0, "Standard deviation of the camera's noise [grey levels of 255]; makes JPEG larger."
+        0.0, "Standard deviation of the camera's noise [grey levels of 255]; makes JPEG larger.", low=0.0, high=255.0
     )
-    click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].")
+    click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].", low=0.0, high=500.0)
     seed: int = option(1, "Seed of the random generator.", low=0)
     reflectors: int = option(
         1, "Number of reflectors, moved in turn; the example clicks name all that stand.", low=1, high=4
@@ -295,10 +304,12 @@ def _check_ranges(options: Any, prefix: str = "") -> None:
         value, name = getattr(options, field.name), f"{prefix}{field.name}"
         if dataclasses.is_dataclass(value):
             _check_ranges(value, f"{name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            low, high = field.metadata["low"], field.metadata["high"]
-            wanted = f"at least {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
-            _require(math.isfinite(value) and low <= value <= high, name, value, wanted)
+            continue
+        low, high = field.metadata["low"], field.metadata["high"]
+        wanted = f"at least {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, int | float) and not isinstance(number, bool):
+                _require(math.isfinite(number) and low <= number <= high, name, value, wanted)
 
 
 def _require(good: bool, name: str, value: object, wanted: str) -> None:

@@ -26,18 +26,20 @@ OTHER_OFFSET_M, OTHER_YAW_DEG = (-0.4, 0.9, 0.25), -5.0
 class RigOptions:
     """How the sensors are mounted; the true values are random around these."""
 
-    radar_height_m: float = option(1.2, "Height of the radar above the ground [m].")
-    radar_tilt_deg: float = option(10.0, "How far the radar looks down [deg].")
-    radar_roll_deg: float = option(0.0, "How far the radar leans to its right [deg].")
+    radar_height_m: float = option(1.2, "Height of the radar above the ground [m].", low=0.05, high=20.0)
+    radar_tilt_deg: float = option(10.0, "How far the radar looks down [deg].", low=-90.0, high=90.0)
+    radar_roll_deg: float = option(0.0, "How far the radar leans to its right [deg].", low=-180.0, high=180.0)
     camera_offset_m: tuple[float, float, float] = option(
-        (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m]."
+        (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m].", low=-20.0, high=20.0
     )
     camera_angles_deg: tuple[float, float, float] = option(
         (0.0, 0.0, 0.0),
         "Nominal rotation of the camera away from looking where the radar looks: its rotation vector in the camera frame [deg].",
+        low=-180.0,
+        high=180.0,
     )
     camera_angle_sigma_deg: float = option(
-        3.0, "Standard deviation of the true rotation about the nominal one, per axis [deg]."
+        3.0, "Standard deviation of the true rotation about the nominal one, per axis [deg].", low=0.0, high=90.0
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import LensOptions, NoiseOptions, RadarOptions, ReflectorOptions
@@ -270,7 +271,7 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
     """Draw reflector positions (count, 3) in the radar frame that the camera sees, apart from one another.
 
     Raises:
-        ValueError: they do not all fit in the layout.
+        OptionError: they do not all fit in the layout.
     """
     found: list[np.ndarray] = []
     for _ in range(2000 * count):
@@ -288,7 +289,7 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
         if apart and bool(rig.camera.sees(rig.camera_from_radar @ point[None])[0]):
             found.append(point)
     if len(found) < count:
-        raise ValueError(f"only {len(found)} of {count} placements fit, {layout.separation_m} m apart and in view")
+        raise OptionError(f"only {len(found)} of {count} placements fit, {layout.separation_m} m apart and in view")
     return np.array(found).reshape(-1, 3)
 
 

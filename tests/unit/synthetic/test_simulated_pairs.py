@@ -18,6 +18,7 @@ from benchmarks.accuracy.defects.pair_defects import (
     with_rounded_elevations,
     with_zero_pair,
 )
+from calib_core.errors import OptionError
 from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.synthetic import (
@@ -98,7 +99,7 @@ def test_every_reflector_is_in_the_image_and_apart_from_the_others():
 
 def test_more_placements_than_fit_are_refused_with_the_number_that_fits():
     crowded = PairsLayout(min_range_m=3.0, max_range_m=4.0, max_azimuth_deg=5.0, separation_m=0.5)
-    with pytest.raises(ValueError, match=r"only \d+ of 40 placements fit"):
+    with pytest.raises(OptionError, match=r"only \d+ of 40 placements fit"):
         simulate_pairs(40, rng=np.random.default_rng(1), layout=crowded)
 
 
