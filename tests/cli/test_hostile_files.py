@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import socket
 import sys
 from dataclasses import replace
@@ -87,16 +88,49 @@ def test_half_a_character_in_our_files_is_refused(cocalib, clicks_file, made, ha
     assert "half of a character" in one_line(cocalib("solve", made(), "--clicks", clicks_file))
 
 
-@pytest.mark.parametrize("depth", [101, 20_000])
-@pytest.mark.parametrize("kind", ["json", "yaml", "xml"])
-def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
-    opening, closing = ("<a>", "</a>") if kind == "xml" else ("[", "]")
+NESTED = {"toml": "a = {}", "json": '{{"a": {}}}', "yaml": "a: {}"}
+PARSED = {
+    "check.json": ["check", "{}"],
+    "check.yaml": ["check", "{}"],
+    "check.xml": ["check", "{}"],
+    "import.json": ["import", "{}", "--out", "c.json"],
+    "import.yaml": ["import", "{}", "--out", "c.json"],
+    "import.xml": ["import", "{}", "--out", "c.json"],
+    "export.yaml": ["export", "{}", "--to", "tf2"],
+    "camera.yaml": ["check", "calibration.json", "--camera", "{}"],
+    "clicks.json": ["solve", "made.mcap", "--clicks", "{}"],
+    "pairs.json": ["solve", "--pairs", "{}"],
+    "boxes.json": ["evaluate", "calibration.json", "made.mcap", "--boxes", "{}"],
+    "options.toml": ["simulate", "--out", "simulated", "--options", "{}"],
+    "manifest.toml": ["batch", "{}"],
+    "recording.toml": ["info", "made.mcap"],
+}
+
+
+@pytest.mark.parametrize("name", PARSED)
+def test_deep_nesting_is_refused(cocalib, solved, monkeypatch, name):
+    monkeypatch.chdir(solved.parent)
     xml = '<?xml version="1.0"?><opencv_storage>{}</opencv_storage>'
-    outside = {"json": '{{"a": {}}}', "yaml": "a: {}", "xml": xml}[kind]
-    path = tmp_path / f"deep.{kind}"
-    path.write_text(outside.format(opening * depth + closing * depth))
-    for command in (("check", path), ("import", path, "--out", tmp_path / "c.json")):
-        assert "deep" in one_line(cocalib(*command))
+    opening, closing = ("<a>", "</a>") if name.endswith("xml") else ("[", "]")
+    Path(name).write_text(NESTED.get(Path(name).suffix[1:], xml).format(opening * 30_000 + closing * 30_000))
+    assert re.search("deep|larger than 64 kB", one_line(cocalib(*(word.format(name) for word in PARSED[name]))))
+
+
+@pytest.mark.parametrize("digits", ["9" * 5000, "0x" + "f" * 5000])
+@pytest.mark.parametrize("name", [name for name in PARSED if not name.endswith("xml")])
+def test_an_integer_of_thousands_of_digits_is_refused(cocalib, solved, monkeypatch, name, digits):
+    monkeypatch.chdir(solved.parent)
+    Path(name).write_text(NESTED[Path(name).suffix[1:]].format(digits))
+    line = one_line(cocalib(*(word.format(name) for word in PARSED[name])))
+    assert "more than 100 digits" in line or "not JSON" in line
+
+
+@pytest.mark.parametrize("name", [name for name in PARSED if name.endswith("yaml")])
+def test_keys_that_yaml_merges_are_refused(cocalib, solved, monkeypatch, name):
+    monkeypatch.chdir(solved.parent)
+    merges = "".join(f"a{n + 1}: &a{n + 1} {{<<: [*a{n}, *a{n}]}}\n" for n in range(40))
+    Path(name).write_text(f"a0: &a0 {{x: 1}}\n{merges}")
+    assert "line 2: " in one_line(cocalib(*(word.format(name) for word in PARSED[name])))
 
 
 @pytest.mark.parametrize("folder", ["/", ".", "./", "..", ""])

@@ -202,7 +202,7 @@ def _unstated_files(_folder: Path) -> list[bytes]:
         "0.1 0.2 0.3 0.5 -0.5 0.5 -0.5\n",
         "<rig><pose rvec='1 2 1' t='1 2 3'/></rig>",
     )
-    return [npy.getvalue(), *(text.encode() for text in texts)]
+    return [npy.getvalue(), _MERGED, *(text.encode() for text in texts)]
 
 
 def _own(data: bytes, _folder: Path) -> None:
@@ -221,6 +221,7 @@ def _own_files(_folder: Path) -> list[bytes]:
         _PAIRS,
         _CLICKS,
         _VIEWS,
+        _MERGED,
         b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n",
     ]
 
@@ -288,6 +289,8 @@ def _messages(data: bytes, _folder: Path) -> None:
     view(history, FACTS, None)
 
 
+_MERGE = b"<<: *a"
+_MERGED = b"a: &a {x: 1, y: [2, 3]}\nb: &b {<<: [*a, *a], y: 4}\nc: [*b, {<<: *b}, 0x7fffffffffffffffffff]\n"
 _PAIRS = (
     b'{"schema":"cocalib/pairs-1","camera":{"model":"pinhole","width_px":640,"height_px":480,'
     b'"matrix_px":[[500,0,320],[0,500,240],[0,0,1]]},'
@@ -340,10 +343,14 @@ TARGETS: tuple[Target, ...] = (
     _folder_target("bin", ".bin", _fixed(np.array([3, 4, 0, 1, 5, 9, 0.9, 0], "<f4").tobytes(), bytes(28))),
     _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
     Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
-    Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported, (b"NaN", b"xyzw", b"1e308")),
-    Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS), (b"${", b"&x", b"xacro:", b"<origin", b"1e999", b"---\n")),
-    Target("unstated", lambda data, _: _swallow(lambda: _unstated(data)), _unstated_files, (b"NaN", b"rpy", b"rvec", b"1e308")),
-    Target("own-files", _own, _own_files, (b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
+    Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported,
+           (_MERGE, b"NaN", b"xyzw", b"1e308")),
+    Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS, _MERGED),
+           (_MERGE, b"${", b"&x", b"xacro:", b"<origin", b"1e999", b"---\n")),
+    Target("unstated", lambda data, _: _swallow(lambda: _unstated(data)), _unstated_files,
+           (_MERGE, b"NaN", b"rpy", b"rvec", b"1e308")),
+    Target("own-files", _own, _own_files,
+           (_MERGE, b"[" * 99, b"9" * 99, b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
     Target("boxes", box_file_reader(_swallow), _fixed(*FILE_SEEDS), FILE_TOKENS),
     Target("box-messages", box_message_reader(_swallow), _fixed(*MESSAGE_SEEDS), (b"bbox", b"results", b"points")),
     Target("session", _session, _sessions, (b'"n"', b'"step"', b'"undo"', b"\n")),

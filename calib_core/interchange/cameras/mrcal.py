@@ -65,7 +65,7 @@ def _dictionary(text: str, *, source: str) -> Mapping[str, Any]:
     """Parse a dictionary of literals; nothing in it is evaluated."""
     try:
         values = ast.literal_eval(python_tree(text.strip(), source=source, mode="eval"))
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError) as error:
         raise InputError(f"{source}: not a valid cameramodel ({error}); write it again with mrcal") from None
     if not isinstance(values, dict):
         raise InputError(f"{source}: not a valid cameramodel: a {type(values).__name__}; write it again with mrcal")

@@ -66,7 +66,7 @@ def camera_beside(folder: Path, files: Sequence[Path], image_size_px: tuple[int,
     try:
         camera = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, image_size_px)
         return camera or _of_nuscenes(folder, files) or _of_astyx(folder, files)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, AttributeError, InputError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError):
         return None  # a file of that name but of another form is not a data set's calibration
 
 

@@ -349,7 +349,7 @@ MODEL = "{'lensmodel': 'LENSMODEL_OPENCV4', 'intrinsics': [500, 501, 320, 240, 0
         ),
         (MODEL.replace("0.1, 0, ", ""), "LENSMODEL_OPENCV4 has 8 numbers, found 6"),
         (MODEL.replace("500,", "__import__('os').system('true'),"), "not a valid cameramodel"),
-        (MODEL + "]", "not a valid cameramodel"),
+        (MODEL + "]", "not Python"),
         (MODEL.replace("'imagersize': [640, 480]", "'imagersize': [640]"), "imagersize: expected 2 numbers, found 1"),
         ("1 THIN_PRISM_FISHEYE 640 480 500 500 320 240", "the model 'THIN_PRISM_FISHEYE' is not supported"),
         ("1 PINHOLE 640 480 500 500 320", "expected at least 4 parameters, found 3"),

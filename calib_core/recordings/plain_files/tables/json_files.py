@@ -101,12 +101,7 @@ def _number(text: str) -> float:
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """Yield every return with its line (or element) number, as the text of its fields."""
     for number, record in _records(path):
-        try:
-            for row in _rows_of(record, "", {}):
-                if row:
-                    yield number, row
-        except RecursionError:
-            raise RecordingError(f"{path}: line {number}: nested too deeply for a radar return") from None
+        yield from ((number, row) for row in _rows_of(record, "", {}) if row)
 
 
 def _records(path: Path) -> Iterator[tuple[int, Any]]:

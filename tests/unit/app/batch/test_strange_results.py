@@ -92,6 +92,15 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name, tmp_path)
         read_outcome(place.read_text())
 
 
+@pytest.mark.parametrize("text", ['{"schema": ' + "[" * 30_000, '{"schema": ' + "9" * 5000, "{", ""], ids=len)
+def test_an_outcome_that_cannot_be_parsed_is_none_and_told(text, tmp_path):
+    folder = ResultsFolder(tmp_path)
+    write(folder)
+    (folder.folder_of(DIGEST) / OUTCOME_FILE).write_text(text)
+    assert folder.outcome(DIGEST) is None
+    assert row_of(tmp_path).status == "unreadable"
+
+
 @pytest.mark.parametrize("below", ["", "export"])
 def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below, tmp_path):
     folder = ResultsFolder(tmp_path / "out")
