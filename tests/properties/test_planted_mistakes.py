@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -231,23 +231,6 @@ def test_a_planted_slip_is_named_in_every_format(name, slip):
         errors = named_errors(wrong, file, by)
         assert set(errors) <= slips
         assert errors or (by == "itself" and name in NO_COMMENT)
-
-
-@pytest.mark.parametrize("slip", SLIPS)
-@pytest.mark.parametrize("name", ["matrix", "tf2", "autoware"])
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
-@given(pose=poses())
-def test_a_planted_slip_is_found_at_any_pose(name, slip, pose):
-    file = file_of(pose)
-    wrong = read_any(planted(file, name, SLIPS[slip]))
-    assume(np.abs(wrong.camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
-
-    named = explaining(wrong, file, 2)
-
-    for by in ("itself", "against", "of"):
-        errors = named_errors(wrong, file, by)
-        assert errors
-        assert set(errors) <= named
 
 
 @pytest.mark.parametrize("name", ["urdf", "autoware", "tf2"])

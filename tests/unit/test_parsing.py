@@ -88,9 +88,9 @@ def test_json_of_our_own_has_the_same_limits():
 
 def test_rows_of_any_size_are_read_one_by_one(tmp_path):
     path = tmp_path / "rows.json"
-    path.write_text(json.dumps([{"n": number, "of": [1.5]} for number in range(200_000)]))
+    path.write_text(json.dumps([{"n": number, "of": [1.5]} for number in range(80_000)]))
     rows = list(json_rows(path, source="", numbers_as_text=True))
-    assert (len(rows), rows[-1]) == (200_000, {"n": "199999", "of": ["1.5"]})
+    assert (len(rows), rows[-1]) == (80_000, {"n": "79999", "of": ["1.5"]})
 
 
 @pytest.mark.parametrize(

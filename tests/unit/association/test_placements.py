@@ -54,12 +54,11 @@ def rests_at(placement: Placement, start: TimeNs, end: TimeNs, position_radar_m:
 @pytest.mark.parametrize(
     "options",
     [
-        SimulationOptions(seed=11),
         SimulationOptions(scene="field", radar="imaging", clutter="heavy", seed=12),
         SimulationOptions(scene="aisle", clutter="heavy", placements=12, seed=13),
         SimulationOptions(scene="checkerboard", radar="imaging", dwell_s=3.5, seed=14),
     ],
-    ids=["rooftop", "field-imaging-heavy", "aisle-heavy", "checkerboard-short"],
+    ids=["field-imaging-heavy", "aisle-heavy", "checkerboard-short"],
 )
 def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(options):
     simulated = simulate(options)

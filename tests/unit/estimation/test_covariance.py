@@ -239,12 +239,12 @@ def solved_with_tape(simulated: SimulatedPairs) -> Calibration:
 def test_the_ellipsoid_contains_the_truth_despite_smooth_errors():
     """If the errors were taken as independent, it would contain the truth in fewer than 3 of 24 sets."""
     inside = 0
-    for seed in range(24):
+    for seed in range(8):
         simulated = with_smooth_errors(seed, 80)
         calibration = solved_with_tape(simulated)
         error = simulated.camera_from_radar.error_from(calibration.camera_from_radar)
         inside += bool(error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile)
-    assert inside >= 20
+    assert inside >= 7
 
 
 def test_smooth_errors_raise_a_warning_and_independent_ones_do_not():

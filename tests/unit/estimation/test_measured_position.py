@@ -98,18 +98,17 @@ def test_pose_and_covariance_follow_a_position_that_is_farther_and_farther_off(
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_sides(noise):
-    for seed in range(2):
-        simulated = simulate_pairs(12, rng=np.random.default_rng([2035, seed]), noise=noise)
-        nearest = int(np.linalg.norm(simulated.points_radar_m, axis=1).argmin())
-        answers = []
-        for k in range(14):
-            pairs = list(simulated.pairs)
-            pixel_px = pairs[nearest].pixel_px + np.array([3.0 * k, 0.0])
-            pairs[nearest] = replace(pairs[nearest], pixel_px=pixel_px)
-            answers.append(solved(replace(simulated, pairs=tuple(pairs)), (0.0, 0.0, 0.0), sigma_m=0.01))
-        for before, after in pairwise(answers):
-            sides = [[pair.inlier for pair in answer.pairs] for answer in (before, after)]
-            assert step(before, after) < 1.0 or sides[0] != sides[1]
+    simulated = simulate_pairs(12, rng=np.random.default_rng([2035, 0]), noise=noise)
+    nearest = int(np.linalg.norm(simulated.points_radar_m, axis=1).argmin())
+    answers = []
+    for k in range(14):
+        pairs = list(simulated.pairs)
+        pixel_px = pairs[nearest].pixel_px + np.array([3.0 * k, 0.0])
+        pairs[nearest] = replace(pairs[nearest], pixel_px=pixel_px)
+        answers.append(solved(replace(simulated, pairs=tuple(pairs)), (0.0, 0.0, 0.0), sigma_m=0.01))
+    for before, after in pairwise(answers):
+        sides = [[pair.inlier for pair in answer.pairs] for answer in (before, after)]
+        assert step(before, after) < 1.0 or sides[0] != sides[1]
 
 
 def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position():

@@ -91,9 +91,9 @@ def test_which_of_the_two_is_the_first_changes_nothing():
 
 
 def test_the_distance_of_unchanged_sessions_is_that_of_six_degrees_of_freedom():
-    squared = [change_of(*sessions(seed, noise="ti")).squared for seed in range(10, 34)]
+    squared = [change_of(*sessions(seed, noise="ti")).squared for seed in range(10, 22)]
 
-    assert 4.0 < np.mean(squared) < 8.5  # 6, to three standard errors
+    assert 3.0 < np.mean(squared) < 9.0  # 6, to three standard errors
 
 
 def test_the_noticeable_size_is_noticed_in_95_of_100():

@@ -140,7 +140,7 @@ def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recordi
 def test_options_out_of_range_are_refused_here_too_and_missing_intrinsics_an_answer():
     assert solve_clicks(Radar(), [CLICK], None, CalibrationOptions()).code == "no-camera"
     wrong = CalibrationOptions(locating=LocatingOptions(window_s=-1.0))
-    with pytest.raises(OptionError, match=r"locating\.window_s: -1 is out of range"):
+    with pytest.raises(OptionError, match=r"locating\.window_s"):
         solve_clicks(Radar(), [CLICK], CAMERA, wrong)
     with pytest.raises(OptionError, match=r"locating\.window_s"):
         solve_pairs(GivenPairs.read("{}", "pairs.json"), wrong)
