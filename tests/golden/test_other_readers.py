@@ -163,7 +163,7 @@ def test_camera_info_is_loaded_as_ros_does_and_by_camera_option(file):
     assert np.array_equal(np.reshape(info["rectification_matrix"]["data"], (3, 3)), np.eye(3))
     assert np.array_equal(np.reshape(info["projection_matrix"]["data"], (3, 4))[:, :3], matrix)
     assert 'radar frame "radar"' in text
-    assert "check point: p_radar [5.0, 1.0, -0.5] m" in text
+    assert "[5.0, 1.0, -0.5] m" in text
 
     camera = read_camera(text)
     assert np.array_equal(camera.matrix_px, file.calibration.camera.matrix_px)

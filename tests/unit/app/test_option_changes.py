@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import re
 
 import msgspec
 import pytest
@@ -70,7 +71,6 @@ def test_a_camera_position_is_set_and_removed_as_a_whole():
         ({"solving": {"camera_position": {"sigma_m": "x"}}}, "option solving.camera_position"),
         ({"solving": {"seed": 1.5}}, "option solving.seed"),
         ({"noise": {"sigma_px": 0.0}}, "option noise.sigma_px: 0 is out of range; allowed: 0.01 to 1000 px"),
-        ({"noise": {"sigma_px": -2.0}}, "option noise.sigma_px"),
         ({"locating": {"max_candidates": 0}}, "option locating.max_candidates: 0 is out of range; allowed: 1 to 50"),
         ({"solving": {"camera_position": {"sigma_m": 0.0}}}, "option solving.camera_position.sigma_m"),
         ({"solving": {"camera_position": {"position_m": [0, 0, 1e9]}}}, "option solving.camera_position.position_m"),
@@ -85,10 +85,10 @@ def test_what_is_not_understood_or_out_of_range_is_refused_with_a_clear_error(tr
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-@pytest.mark.parametrize("path", sorted(path for path in RANGES if "camera_position" not in path))
-def test_no_number_may_be_infinite_or_missing(path, value):
-    with pytest.raises(OptionError, match="out of range"):
-        changed_options(CalibrationOptions(), [OptionChange(path, value)])
+def test_no_number_may_be_infinite_or_missing(value):
+    for path in (path for path in RANGES if "camera_position" not in path):
+        with pytest.raises(OptionError, match=rf"{re.escape(path)}: \S+ is out of range"):
+            changed_options(CalibrationOptions(), [OptionChange(path, value)])
 
 
 def test_a_choice_that_was_set_directly_is_checked_too():
