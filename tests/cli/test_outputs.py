@@ -68,7 +68,7 @@ _UNSOLVED = {
     *("intrinsics.out, board", "intrinsics.views", "intrinsics.report"),
 }
 """Nothing comes of grey images that could be written; what may be written is told before."""
-_STREAMED = {"export.out, mcap", "show.out", "show.out, overlay", "show.out, rrd"}
+_STREAMED = {"export.out, maps", "export.out, mcap", "show.out", "show.out, overlay", "show.out, rrd"}
 _EXTRA = {"show.out": "av", "show.out, overlay": "av", "show.out, rrd": "rerun"}
 
 
