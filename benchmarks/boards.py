@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import Points2
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.synthetic.boards import (
     MARGIN_SQUARES,
     BoardMotion,

@@ -20,16 +20,10 @@ if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.errors import CalibrationError, InputError, OptionError, RecordingError, UnsolvableError
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import (
-        AgreementLimits,
-        CalibrationFile,
-        CheckReport,
-        Export,
-        FrameNames,
-        PairsFile,
-        Provenance,
-        VehicleNote,
-    )
+    from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, VehicleNote
+    from calib_core.interchange.check.agreement import AgreementLimits
+    from calib_core.interchange.check.report import CheckReport
+    from calib_core.interchange.exporting import Export
     from calib_core.interchange.files import (
         check,
         export,
@@ -41,6 +35,7 @@ if TYPE_CHECKING:
         write_clicks,
         write_pairs,
     )
+    from calib_core.interchange.own.pairs_files import PairsFile
     from calib_core.lens_models.lens_model import LensModel
     from calib_core.measurements import Candidate, Pair, RadarScan, RadarScans, ReflectorClick, Unpaired, Unsolvable
     from calib_core.options import (
@@ -136,20 +131,15 @@ _MODULES = {
     "camera": ("Camera",),
     "errors": ("CalibrationError", "InputError", "OptionError", "RecordingError", "UnsolvableError"),
     "geometry": ("RigidTransform",),
-    "interchange": (
-        "AgreementLimits",
-        "CalibrationFile",
-        "CheckReport",
-        "Export",
-        "FrameNames",
-        "PairsFile",
-        "Provenance",
-        "VehicleNote",
-    ),
+    "interchange.calibration_file": ("CalibrationFile", "FrameNames", "Provenance", "VehicleNote"),
+    "interchange.check.agreement": ("AgreementLimits",),
+    "interchange.check.report": ("CheckReport",),
+    "interchange.exporting": ("Export",),
     "interchange.files": (
         *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),
         *("write_calibration", "write_clicks", "write_pairs"),
     ),
+    "interchange.own.pairs_files": ("PairsFile",),
     "lens_models.lens_model": ("LensModel",),
     "measurements": ("Candidate", "Pair", "RadarScan", "RadarScans", "ReflectorClick", "Unpaired", "Unsolvable"),
     "options": (

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from calib_core.interchange import CAMERA_ONLY, FORMATS
+from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 
 PAGE = Path(__file__).parent / "formats.md"
 _HEAD = "| FORMAT | what | file | camera | meaning of the numbers |\n|---|---|---|---|---|\n"

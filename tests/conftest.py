@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
-    from calib_core.interchange import CalibrationFile
+    from calib_core.interchange.calibration_file import CalibrationFile
 
 # The same examples on every run, without a time limit for each: a busy machine must not cause failures.
 settings.register_profile("cocalib", deadline=None, derandomize=True)
@@ -51,7 +51,7 @@ def golden_text(project_root: Path) -> str:
 @pytest.fixture(scope="session")
 def file(golden_text: str) -> "CalibrationFile":
     """Return the golden calibration as it is read."""
-    from calib_core.interchange import read_calibration
+    from calib_core.interchange.own.calibration_json import read_calibration
 
     return read_calibration(golden_text)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, open_recording

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from calib_core.camera import Camera
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick
 from calib_core.recordings import open_recording
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calib_core.interchange import read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import Box, RadarScans, TimeNs
-from cocalib.view import Reference
+from cocalib.view.reference import Reference
 from tests.image_recording import ImageRecording
 from tests.street import CAMERA, TRUE_POSE, street
 

@@ -19,7 +19,7 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.dwell_views import has_changed
 from calib_core.proposing.look import Look, likeness_elsewhere, look_of, with_look
-from calib_core.words import outcome_told
+from calib_core.words.outcomes import outcome_told
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
 

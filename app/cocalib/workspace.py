@@ -12,30 +12,22 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import CameraFile, camera_info_text, read_clicks, write_clicks
+from calib_core.interchange.cameras.files import CameraFile
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
 from cocalib.hypothesis_sheet import OpenMeaning
-from cocalib.session import (
-    AssumedReading,
-    ChosenIntrinsics,
-    ClicksImported,
-    History,
-    RecordingFacts,
-    Redo,
-    ScansAdded,
-    Session,
-    Solved,
-    Step,
-    Undo,
-    advance,
-    settled,
-)
-from cocalib.session.file import Closed, Restored, open_session_file
+from cocalib.session.applying import History, advance, settled
+from cocalib.session.events import ClicksImported, Redo, ScansAdded, Solved, Step, Undo
+from cocalib.session.file.session_file import Closed, Restored, open_session_file
+from cocalib.session.state import AssumedReading, ChosenIntrinsics, RecordingFacts, Session
 from cocalib.solving.worker import SolverWorker
-from cocalib.view import Reference, View, view
+from cocalib.view.build import view
+from cocalib.view.model import View
+from cocalib.view.reference import Reference
 
 _LONGEST_WAIT_S = 1.0
 Subscriber: TypeAlias = Callable[[View], None]

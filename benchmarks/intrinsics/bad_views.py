@@ -6,7 +6,11 @@ import numpy as np
 from benchmarks.boards import render_board
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, Images, drawn_series
 from benchmarks.intrinsics.tables import Table
-from calib_core.intrinsics import Board, BoardSearch, CalibratedLens, calibrate_lens, search_boards
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_search import search_boards
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.synthetic.boards import waved_poses
 
 __all__ = ["bad_view_table", "planted", "used_images"]

@@ -11,7 +11,10 @@ from benchmarks.intrinsics.rendered import scaled_errors
 from benchmarks.intrinsics.tables import Table
 from calib_core.arrays import Points2
 from calib_core.camera import Camera, CameraModel
-from calib_core.intrinsics import BoardCorners, BoardSearch, CalibratedLens, calibrate_lens
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.intrinsics.image_maps import far_point_slopes, found_pixels, grid_covariance
 from calib_core.synthetic.boards import waved_poses
 

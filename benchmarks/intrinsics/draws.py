@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.boards import BoardFilm, render_board, true_corners
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses

@@ -7,7 +7,10 @@ import numpy as np
 
 from benchmarks.intrinsics.draws import BOARDS, FILMS, LENSES, Series, drawn_series
 from benchmarks.intrinsics.tables import Table
-from calib_core.intrinsics import BoardSearch, CalibratedLens, calibrate_lens, search_boards
+from calib_core.intrinsics.board_search import search_boards
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 
 __all__ = ["Rendered", "boards", "films", "measured"]
 

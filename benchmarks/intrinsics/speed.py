@@ -10,7 +10,9 @@ import numpy as np
 from benchmarks.boards import render_board
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, drawn_camera
 from benchmarks.intrinsics.tables import Table
-from calib_core.intrinsics import BoardSearch, calibrate_lens, search_boards
+from calib_core.intrinsics.board_search import search_boards
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.measurements import TimeNs
 from calib_core.synthetic.boards import waved_poses
 

@@ -23,7 +23,7 @@ from benchmarks.paper.rows import (
 from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, other_rig
 from benchmarks.proposing.images import SimulatedImages
 from calib_core.arrays import Flags, Indices, Points2
-from calib_core.evaluation import BoxFigures
+from calib_core.evaluation.figures import BoxFigures
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Box, TimeNs
 from calib_core.results import Calibration

@@ -8,7 +8,10 @@ import numpy as np
 from benchmarks.paper.rows import by_mounting, calibrated, with_gross_errors
 from benchmarks.paper.settings import Settings, other_rig, session, under
 from calib_core.camera import Camera
-from calib_core.evaluation import BoxFigures, TargetTrack, counted_returns, judged_by_boxes, moving_targets
+from calib_core.evaluation.box_acc import judged_by_boxes
+from calib_core.evaluation.counted_returns import counted_returns
+from calib_core.evaluation.figures import BoxFigures
+from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels, TimeNs
 from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, simulate

@@ -15,11 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.measurements import TimeNs
-from cocalib.session import ClickMoved, ClickPlaced, ClickRemoved, History, RecordingFacts, Step, Undo, advance
-from cocalib.session.file import SessionFileError, open_session_file
+from cocalib.session.applying import History, advance
+from cocalib.session.events import ClickMoved, ClickPlaced, ClickRemoved, Step, Undo
 from cocalib.session.file.contents import read_contents
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.journal import COPY, JOURNAL
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
 
 __all__ = ["Made", "every_bit", "every_kill", "every_length", "made_session", "sampled_bits"]
 

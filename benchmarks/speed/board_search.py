@@ -7,7 +7,8 @@ import numpy as np
 
 from benchmarks.boards import BoardFilm, render_board
 from benchmarks.speed.rows import Row, Table
-from calib_core.intrinsics import Board, search_boards
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_search import search_boards
 from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses

@@ -13,10 +13,12 @@ from benchmarks.speed.rows import Row, Table, section
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
-from cocalib.session import History, RecordingFacts, Session
-from cocalib.view import View, view
+from cocalib.session.applying import History
+from cocalib.session.state import RecordingFacts, Session
+from cocalib.view.build import view
+from cocalib.view.model import View
 from cocalib.web.channel.outbox import ViewFeed
-from cocalib.web.messages import encode
+from cocalib.web.messages.outgoing import encode
 
 __all__ = ["measure_channel"]
 

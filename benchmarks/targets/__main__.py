@@ -10,7 +10,9 @@ import numpy as np
 from benchmarks.accuracy.fresh_seeds import fresh_seeds
 from benchmarks.targets.cases import CASES
 from calib_core.errors import InputError, OptionError
-from calib_core.evaluation import CountedReturns, counted_returns, judged_by_boxes, moving_targets
+from calib_core.evaluation.box_acc import judged_by_boxes
+from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
+from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic import SimulationOptions, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels

@@ -12,8 +12,9 @@ from calib_core.arrays import Points3
 from calib_core.deployment.camera_info import ChosenTopic, InfoTemplate, choose_topic
 from calib_core.deployment.placing import SensorFrames, is_transforms, place_transform, read_frames
 from calib_core.errors import InputError, RecordingError
-from calib_core.interchange import CalibrationFile, write_calibration
+from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.formats.statement import statement
+from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
 from calib_core.radar import RadarErrors
 from calib_core.recordings import Recording
@@ -24,7 +25,7 @@ from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMes
 from calib_core.recordings.messages.definitions import with_definition
 from calib_core.recordings.topics import join_topics
 from calib_core.results import Calibration
-from calib_core.words import told
+from calib_core.words.warnings import told
 
 _PROGRESS_MESSAGES = 256
 _MEANING = "transforms are poses of the child in the parent, quaternion x y z w; calibration.json is attached"

@@ -10,7 +10,8 @@ from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, Resid
 from calib_core.input_files import encodable
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.measurements import Stamp, TimeNs
-from calib_core.words import unpaired_told, warning_text
+from calib_core.words.outcomes import warning_text
+from calib_core.words.unpaired import unpaired_told
 
 EVALUATION_SCHEMA = "cocalib/evaluation-1"
 

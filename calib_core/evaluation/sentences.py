@@ -3,7 +3,8 @@
 import numpy as np
 
 from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, ResidualFigures, Sensitivity, Share, Spread
-from calib_core.words import said_of, unpaired_told
+from calib_core.words.outcomes import said_of
+from calib_core.words.unpaired import unpaired_told
 
 NOT_ACCURACY = (
     "Acc is not accuracy: a pose that is wrong by half a degree can score as well as the right one, or better; judge a pose "

@@ -10,7 +10,7 @@ from msgspec.structs import asdict, replace
 
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
-from calib_core.words import StatedVerdict
+from calib_core.words.verdict import StatedVerdict
 
 MOST_CHARACTERS = 120
 """The longest name or serial, in manifests, files and flags alike."""

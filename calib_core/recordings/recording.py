@@ -38,7 +38,7 @@ from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import InputFile
 from calib_core.results.confirmation import lost_returns
-from calib_core.words import told
+from calib_core.words.warnings import told
 
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12

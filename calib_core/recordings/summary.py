@@ -21,7 +21,7 @@ from calib_core.recordings.time.clock_choice import choose_clock
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, diagnose
 from calib_core.recordings.time.written_times import span_text, utc
 from calib_core.recordings.topics import Rhythm, StampedTopic, TopicSummary, join_topics, read_stamps
-from calib_core.words import WarningText, warning_text
+from calib_core.words.outcomes import WarningText, warning_text
 
 _GAP_PERIODS = 5.0
 _STRETCH_GAP_NS = NS_PER_S

@@ -22,7 +22,7 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import LOSSES, Recording
 from calib_core.recordings.summary import FileSummary, files_of
-from calib_core.words import WarningText, warning_text
+from calib_core.words.outcomes import WarningText, warning_text
 
 _PROGRESS_MESSAGES = 200
 

@@ -12,7 +12,7 @@ from calib_core.arrays import Points2, Points3, Values, Vector2, Vector3, frozen
 from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.synthetic.rig import Window
 
 MARGIN_SQUARES = 0.6

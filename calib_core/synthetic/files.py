@@ -17,7 +17,8 @@ import numpy as np
 from calib_core.boxes import boxes_text, labels_text
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import camera_info_text, write_clicks
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.own.clicks_json import write_clicks
 from calib_core.interchange.own.documents import camera_document
 from calib_core.lens_models.registry import written_lens
 from calib_core.measurements import RadarScan, TimeNs, time_parts

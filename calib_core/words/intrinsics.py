@@ -8,7 +8,10 @@ from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.text import sentence
 
 if TYPE_CHECKING:
-    from calib_core.intrinsics import Board, LeftOutImage, ResidualField, SplitDifference
+    from calib_core.intrinsics.board import Board
+    from calib_core.intrinsics.board_images import LeftOutImage
+    from calib_core.intrinsics.image_maps import ResidualField
+    from calib_core.intrinsics.split_difference import SplitDifference
 
 _FILM = "film the board from at least 10 directions, turned by 30 to 45 deg to the left, right, up and down"
 _BENDS = {

@@ -3,7 +3,7 @@
 import numpy as np
 
 import cocalib as cc
-from calib_core.evaluation import residual_figures
+from calib_core.evaluation.residuals import residual_figures
 
 # Two recordings of one rig are better; here the clicks of one are divided.
 with cc.sample_recording() as recording:

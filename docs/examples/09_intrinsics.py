@@ -3,7 +3,10 @@
 import numpy as np
 
 import cocalib as cc
-from calib_core.intrinsics import Board, BoardCorners, BoardSearch, calibrate_lens
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
 

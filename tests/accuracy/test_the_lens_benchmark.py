@@ -8,7 +8,8 @@ from benchmarks.intrinsics.coverage import CASES, CornerErrors, drawn_search
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, LENSES, changed_light, drawn_camera, drawn_series, moved
 from benchmarks.intrinsics.rendered import measured, scaled_errors
 from benchmarks.intrinsics.tables import Table
-from calib_core.intrinsics import CalibratedLens, calibrate_lens
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
 
 _DRAWS = 6
 

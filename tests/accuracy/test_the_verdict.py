@@ -9,7 +9,7 @@ from calib_core.calibration import calibrate
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import PRESETS, simulate
 from calib_core.synthetic.sample import SAMPLE_OPTIONS
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.view.build import verdict_row
 
 CASES = (

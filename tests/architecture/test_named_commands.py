@@ -115,7 +115,7 @@ def test_what_a_user_must_know_stays_little(project_root: Path) -> None:
 
 def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At most 40,000 words without what a program writes: whole pages, rows of a registry, and shown output."""
-    monkeypatch.setattr("calib_core.interchange.FORMATS", ())
+    monkeypatch.setattr("calib_core.interchange.formats.registry.FORMATS", ())
     monkeypatch.setattr("calib_core.recordings.radar.registry.DECODERS", ())
     monkeypatch.setattr("calib_core.recordings.plain_files.tables.text_tables.csv_columns", list)
     makers = {

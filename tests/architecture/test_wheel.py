@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import render_board
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
 from tests.architecture.test_named_commands import command_lines

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from calib_core.words import Words
+from calib_core.words.text import Words
 
 _READS = {
     "startswith",

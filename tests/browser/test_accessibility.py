@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from calib_core.recordings import Recording
-from cocalib.web.messages import Opening
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from calib_core.interchange import FORMATS, check, format_named, read_any, read_any_file
+from calib_core.interchange.check.report import check
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import read_any, read_any_file
 from calib_core.recordings import Recording
 from tests.browser.driving import Driver
 from tests.serving import serving

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import Stamp
-from cocalib.session import History, RecordingFacts
-from cocalib.view import ClickRow, View, view
-from cocalib.view.model import Ellipse
+from cocalib.session.applying import History
+from cocalib.session.state import RecordingFacts
+from cocalib.view.build import view
+from cocalib.view.model import ClickRow, Ellipse, View
 from cocalib.web.channel.outbox import ViewFeed
-from cocalib.web.messages import encode
+from cocalib.web.messages.outgoing import encode
 from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 

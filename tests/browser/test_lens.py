@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from calib_core.interchange import read_camera_file
+from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, simulate, write_recording

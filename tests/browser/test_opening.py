@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from calib_core.recordings import Recording, first_image
-from cocalib.web.messages import Opening
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port.link import HandOver, ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service

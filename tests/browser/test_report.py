@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from cocalib.report import print_pdf, report_html
+from cocalib.report.page import report_html
+from cocalib.report.printing import print_pdf
 from cocalib.workspace import Workspace
 from tests.browser.accessibility import page_violations
 from tests.browser.driving import Driver

@@ -11,7 +11,7 @@ import pytest
 
 from calib_core.measurements import ReflectorClick, time_from_parts
 from cocalib.cli import run
-from cocalib.session import ClickExcluded, ClicksImported
+from cocalib.session.events import ClickExcluded, ClicksImported
 from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace
 from tests.browser.driving import Driver

@@ -8,7 +8,7 @@ import pytest
 from calib_core.recordings import RecordingOptions
 from cocalib.opening.choice import Choice
 from cocalib.opening.opened import with_remembered
-from cocalib.session import ColumnsMapped
+from cocalib.session.events import ColumnsMapped
 from tests.unit.app.session.drive import kept
 from tests.vendor_recording import STATED, vendor_sample
 

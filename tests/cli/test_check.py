@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
 
 
 @pytest.fixture

@@ -11,7 +11,8 @@ import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from calib_core.interchange import read_any, read_calibration
+from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from cocalib.cli import run
 from tests.unit.interchange.trees import vehicles

@@ -13,7 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from calib_core.interchange import read_camera_file
+from calib_core.interchange.cameras.files import read_camera_file
 from cocalib.cli import board_searching as searching
 from cocalib.intrinsics.image_sources import FileImages
 

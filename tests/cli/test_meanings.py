@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import camera_info_text, read_calibration
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from tests.cli.conftest import Made
 

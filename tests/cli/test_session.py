@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from calib_core.interchange import read_clicks
-from cocalib.session import RecordingFacts
-from cocalib.session.file import open_session_file
+from calib_core.interchange.own.clicks_json import read_clicks
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
 from tests.unit.app.session.drive import files, kept, place, restored
 
 FACTS = RecordingFacts("drive.bag", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), 640, 480)

@@ -7,8 +7,10 @@ from typing import Literal
 import numpy as np
 
 from calib_core.errors import CalibrationError
-from calib_core.interchange import ImportedCalibration, WantedFrames, read_together, tree_files
+from calib_core.interchange.format import ImportedCalibration
 from calib_core.interchange.hypotheses.reading import read_clear, read_unstated
+from calib_core.interchange.importing import read_together, tree_files
+from calib_core.interchange.trees.frame_choice import WantedFrames
 from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, DISTORTION, SIZE, Calibration, K
 
 Outcome = Literal["right", "refused", "wrong"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.interchange import read_any, read_any_file
+from calib_core.interchange.importing import read_any, read_any_file
 from tests.corpus_calibrations.data_sets import DATA_SETS
 from tests.corpus_calibrations.reading import Reading, read
 from tests.corpus_calibrations.ros import ROS

@@ -10,19 +10,17 @@ import numpy as np
 
 from calib_core.deployment.placing import read_frames
 from calib_core.errors import CalibrationError
-from calib_core.interchange import (
-    FORMATS,
-    camera_info_text,
-    export,
-    read_any,
-    read_calibration,
-    read_camera,
-    read_clicks,
-    read_pairs,
-)
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.exporting import export
+from calib_core.interchange.formats.registry import FORMATS
 from calib_core.interchange.hypotheses.ranking import hypotheses_of
 from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.own.board_views_json import read_board_views
+from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.own.clicks_json import read_clicks
+from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, describe, first_image, inspect_recording
 from calib_core.recordings.containers.copying import Losses, copied_file
@@ -32,9 +30,12 @@ from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import read_time, time_from_name
-from cocalib.session import ClickExcluded, ClickPlaced, ClicksImported, History, RecordingFacts, Undo, advance, settled
-from cocalib.session.file import SessionFileError, open_session_file
-from cocalib.view import view
+from cocalib.session.applying import History, advance, settled
+from cocalib.session.events import ClickExcluded, ClickPlaced, ClicksImported, Undo
+from cocalib.session.file.guarded_folder import SessionFileError
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
+from cocalib.view.build import view
 from cocalib.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
 from cocalib.web.port import guard
 from cocalib.web.port.guard import Admissions

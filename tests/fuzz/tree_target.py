@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from calib_core.interchange import WantedFrames, patched, read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.trees.frame_choice import WantedFrames
+from calib_core.interchange.trees.patching import patched
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles
 

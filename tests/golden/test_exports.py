@@ -14,7 +14,10 @@ from ruamel.yaml import YAML
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import FORMATS, CalibrationFile, export, format_named, read_any
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.exporting import export
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import read_any
 
 RADAR_FROM_CAMERA_M = [0.006418, 0.000900, -0.062374]
 QUATERNION_XYZW = [-0.536832, 0.529679, -0.447351, 0.480758]

@@ -17,14 +17,11 @@ from pytransform3d.urdf import UrdfTransformManager
 from scipy.spatial.transform import Rotation
 
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    CalibrationFile,
-    export,
-    format_named,
-    parent_pose,
-    read_any,
-    read_camera,
-)
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.exporting import export, parent_pose
+from calib_core.interchange.formats.registry import format_named
+from calib_core.interchange.importing import read_any
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 POINT_RADAR_M = np.array([8.0, -1.5, 0.4])

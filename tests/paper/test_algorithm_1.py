@@ -41,7 +41,8 @@ from calib_core.results.actions import SetOption
 from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import study_camera
-from calib_core.words import OptionPart, outcome_told
+from calib_core.words.outcomes import outcome_told
+from calib_core.words.text import OptionPart
 
 START_NS = 1_700_000_000_123_456_789
 AS_PRINTED = PaperOptions()

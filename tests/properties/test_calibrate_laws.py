@@ -13,7 +13,7 @@ from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from calib_core.words import outcome_told
+from calib_core.words.outcomes import outcome_told
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 SEEDS = st.integers(0, 10_000)

@@ -16,7 +16,7 @@ from calib_core.geometry import (
     rotation_exp,
     rotation_log,
 )
-from calib_core.interchange import CheckPairs
+from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.hypotheses.ranking import hypotheses_of
 from calib_core.interchange.hypotheses.reading import read_unstated
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix

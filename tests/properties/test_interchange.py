@@ -13,23 +13,15 @@ from hypothesis import strategies as st
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    FrameNames,
-    calibration_text,
-    check,
-    export,
-    format_named,
-    read_any,
-    read_calibration,
-    read_camera,
-    read_clicks,
-    read_pairs,
-    write_calibration,
-    write_clicks,
-)
-from calib_core.interchange.calibration_file import choose_check_point
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, choose_check_point
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import export
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
+from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
+from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.rotations import matrix_from_rpy, rpy_from_matrix
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.interchange.syntax.yaml_text import load_yaml, number_text

@@ -6,7 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from calib_core.intrinsics import BoardCorners, BoardSearch, CalibratedLens, calibrate_lens
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views
 
 VIEWS = drawn_views(CAMERAS["plumb_bob"], 9, 31)

@@ -13,20 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    FrameNames,
-    ImportedCalibration,
-    WrittenPose,
-    check,
-    export,
-    format_named,
-    imported,
-    read_any,
-)
-from calib_core.interchange.calibration_file import choose_check_point
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, choose_check_point
+from calib_core.interchange.check.report import check
 from calib_core.interchange.check.slips import undone_slips
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import ImportedCalibration, WrittenPose, imported
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics

@@ -14,26 +14,24 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from cocalib.session import (
+from cocalib.session.applying import History, advance, settled
+from cocalib.session.events import (
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
-    History,
     OptionsChanged,
-    RecordingFacts,
     Redo,
-    Session,
     Solved,
     Step,
     Undo,
-    advance,
-    settled,
 )
-from cocalib.session.file import open_session_file
-from cocalib.view import View, view
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts, Session
+from cocalib.view.build import view
+from cocalib.view.model import View
 from cocalib.workspace import Workspace
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 33_333_333 * np.arange(8), width_px=64, height_px=48)

@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from calib_core.intrinsics import board_of_size, search_boards
+from calib_core.intrinsics.board import board_of_size
 from calib_core.intrinsics.board_detection import blur_px, find_board
+from calib_core.intrinsics.board_search import search_boards
 from calib_core.measurements import TimeNs
 
 BOARD = board_of_size("9x6", 25.0)

@@ -13,7 +13,7 @@ from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import open_recording
 from calib_core.results import Calibration, Metrics
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.web.radar_sight import RadarSight, overlay_of
 
 pytestmark = pytest.mark.real

@@ -9,7 +9,7 @@ import pytest
 
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.errors import InputError, OptionError
-from calib_core.interchange import calibration_text, read_calibration
+from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from calib_core.errors import InputError
-from calib_core.interchange import names_schema
-from calib_core.interchange.own.documents import CLICKS_SCHEMA
+from calib_core.interchange.own.documents import CLICKS_SCHEMA, names_schema
 from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.solving import intrinsics_near
 

@@ -10,8 +10,8 @@ from msgspec import Meta, Struct
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import read_text
-from calib_core.interchange import format_named
 from calib_core.interchange.calibration_file import MOST_CHARACTERS, require_label, require_name
+from calib_core.interchange.formats.registry import format_named
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.parsing import toml_table

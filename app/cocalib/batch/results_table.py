@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from calib_core.errors import CalibrationError, InputError
 from calib_core.file_tag import kind_of
 from calib_core.geometry import quaternion_wxyz_from_matrix
-from calib_core.interchange import read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, Status, read_outcome

@@ -16,13 +16,15 @@ from msgspec.structs import replace
 
 from calib_core.arrays import Matrix66
 from calib_core.errors import CalibrationError, InputError
-from calib_core.evaluation import Evaluation, evaluation_json
-from calib_core.interchange import export
+from calib_core.evaluation.evaluation_json import evaluation_json
+from calib_core.evaluation.figures import Evaluation
+from calib_core.interchange.exporting import export
 from calib_core.measurements import Unsolvable
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import InputFile
 from calib_core.results.verdict import verdict_on
-from calib_core.words import outcome_told, stated_verdict
+from calib_core.words.outcomes import outcome_told
+from calib_core.words.verdict import stated_verdict
 from cocalib.batch.inputs import all_reached, inputs_of, state_of
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
@@ -34,7 +36,9 @@ from cocalib.evaluation.evaluating import EvidenceOptions, evaluate_recording, e
 from cocalib.evaluation.recording_check import judged_calibration, other_camera
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
-from cocalib.report import Judged, report_html, subject_of, watched
+from cocalib.report.making import subject_of, watched
+from cocalib.report.page import report_html
+from cocalib.report.subject import Judged
 
 _Made = TypeVar("_Made")
 _UNREACHED = frozenset(

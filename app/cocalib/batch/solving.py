@@ -5,7 +5,10 @@ from pathlib import Path
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CameraFile, ImportedCalibration, VehicleNote, imported, read_calibration
+from calib_core.interchange.calibration_file import VehicleNote
+from calib_core.interchange.cameras.files import CameraFile
+from calib_core.interchange.format import ImportedCalibration, imported
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file, write_clicks
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording

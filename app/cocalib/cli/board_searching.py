@@ -8,7 +8,8 @@ from pathlib import Path
 
 from calib_core.input_files import read_text
 from calib_core.interchange.own.board_views_json import read_board_views, write_board_views
-from calib_core.intrinsics import Board, BoardSearch, SearchProgress
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.image_sources import OpenImages
 from cocalib.intrinsics.resumed_search import ResumedSearch

@@ -18,7 +18,9 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import CheckedFile, CheckPairs, CheckReport, ImportedCalibration
+    from calib_core.interchange.check.pair_residuals import CheckPairs
+    from calib_core.interchange.check.report import CheckedFile, CheckReport
+    from calib_core.interchange.format import ImportedCalibration
     from cocalib.evaluation.comparing import ComparedOnRecording
 
 
@@ -61,7 +63,7 @@ class Check:
 
     def run(self) -> int:
         """Print the results; return the exit code."""
-        from calib_core.interchange import check_json, check_junit, exit_code
+        from calib_core.interchange.check.report import check_json, check_junit, exit_code
         from cocalib.evaluation.comparing import comparison_document, comparison_lines
 
         self._require_fitting()
@@ -109,7 +111,9 @@ class Check:
 
     def _evidence(self) -> "_Evidence":
         """Read what all files are checked with, once."""
-        from calib_core.interchange import read_any_file, read_camera_file, read_check_pairs_file
+        from calib_core.interchange.cameras.files import read_camera_file
+        from calib_core.interchange.check.pair_residuals import read_check_pairs_file
+        from calib_core.interchange.importing import read_any_file
 
         return _Evidence(
             of=read_any_file(self.of) if self.of else None,
@@ -120,7 +124,8 @@ class Check:
 
     def _checked(self, path: Path, evidence: "_Evidence") -> "CheckedFile":
         """Check one file; if it cannot be read, say so instead."""
-        from calib_core.interchange import AgreementLimits, CheckedFile, check
+        from calib_core.interchange.check.agreement import AgreementLimits
+        from calib_core.interchange.check.report import CheckedFile, check
 
         try:
             report = check(

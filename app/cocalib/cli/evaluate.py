@@ -20,13 +20,13 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.evaluation import Evaluation
-    from calib_core.interchange import ImportedCalibration
+    from calib_core.evaluation.figures import Evaluation
+    from calib_core.interchange.format import ImportedCalibration
     from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
     from calib_core.recordings import Recording
     from calib_core.results import Calibration
     from cocalib.evaluation.evaluating import EvidenceOptions
-    from cocalib.report import ReportSubject
+    from cocalib.report.subject import ReportSubject
 
 _LEVELS = typing.get_args(Required)
 _HTML, _PDF = (".html", ".htm"), (".pdf",)
@@ -88,9 +88,10 @@ class Evaluate:
         self, found: "ImportedCalibration", calibration: "Calibration | None", evaluation: "Evaluation | None"
     ) -> int:
         """Print the figures and what is required; return the exit code."""
-        from calib_core.evaluation import evaluation_json, evaluation_lines
+        from calib_core.evaluation.evaluation_json import evaluation_json
+        from calib_core.evaluation.sentences import evaluation_lines
         from cocalib.evaluation.evaluating import evaluation_exit_code
-        from cocalib.report import limits_met
+        from cocalib.report.sections.acceptance import limits_met
 
         assert self.calibration is not None
         limits = limits_met(self._limits(), calibration)
@@ -155,7 +156,9 @@ class Evaluate:
 
     def _report(self) -> int:
         """Write the report; return the exit code."""
-        from cocalib.report import limits_met, print_pdf, report_html
+        from cocalib.report.page import report_html
+        from cocalib.report.printing import print_pdf
+        from cocalib.report.sections.acceptance import limits_met
 
         for path in self.report:
             if path.suffix.lower() not in (*_HTML, *_PDF):  # such as that of the calibration itself
@@ -170,7 +173,7 @@ class Evaluate:
         return self._told(subject.found, subject.calibration, evaluation)
 
     def _subject(self) -> "ReportSubject":
-        from cocalib.report import against_of, known_calibration, subject_of
+        from cocalib.report.making import against_of, known_calibration, subject_of
 
         assert self.calibration is not None
         name = self.calibration.name
@@ -192,7 +195,7 @@ class Evaluate:
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
         from cocalib.evaluation.recording_check import other_camera, require_size
-        from cocalib.report import known_calibration, subject_of, watched
+        from cocalib.report.making import known_calibration, subject_of, watched
 
         assert self.calibration is not None
         name = self.calibration.name
@@ -218,7 +221,8 @@ class Evaluate:
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
         from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
-        from cocalib.report import Judged, known_calibration
+        from cocalib.report.making import known_calibration
+        from cocalib.report.subject import Judged
 
         options = self.judging.evidence.options()
         clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [subject.found])

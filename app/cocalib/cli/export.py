@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from calib_core.errors import InputError, RecordingError
-from calib_core.words import said_of
+from calib_core.words.outcomes import said_of
 from cocalib.cli.flags import OUTPUT_FOLDER, Output, OutputFlags, Switch, called
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import TopicFlags, Topics
@@ -20,8 +20,8 @@ from cocalib.platform.terminal import print_exactly
 if TYPE_CHECKING:
     from calib_core.deployment import RecordingWritten
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile, Provenance
-    from calib_core.interchange import Export as Written
+    from calib_core.interchange.calibration_file import CalibrationFile, Provenance
+    from calib_core.interchange.exporting import Export as Written
     from calib_core.recordings import Recording
 
 MCAP = "mcap"
@@ -58,7 +58,8 @@ class Export:
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        from calib_core.interchange import format_named, parent_pose, written_formats
+        from calib_core.interchange.exporting import parent_pose
+        from calib_core.interchange.formats.registry import format_named, written_formats
 
         if self.to == MCAP or self.recording or self.topics != TopicFlags():
             return self._export_recording()
@@ -105,7 +106,7 @@ class Export:
     def _calibration(self) -> "CalibrationFile":
         if len(self.calibration) != 1:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
-        from calib_core.interchange import for_raw
+        from calib_core.interchange.own.raw_data import for_raw
 
         file = _own_calibration(self.calibration[0])
         return file if self.for_ is None else for_raw(file)
@@ -140,7 +141,7 @@ def _write_all(
     file: "CalibrationFile", folder: Path | None, *, parent_from_radar: "RigidTransform | None", rectified: bool
 ) -> int:
     """Write every format that can hold the calibration into a folder, and print why the others cannot."""
-    from calib_core.interchange import export_all
+    from calib_core.interchange.exporting import export_all
 
     if folder is None or (folder.exists() and not folder.is_dir()):
         raise InputError("--to all needs a folder: --out FOLDER")
@@ -178,7 +179,8 @@ def _print_warnings(file: "CalibrationFile") -> None:
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":
-    from calib_core.interchange import consistent_file, read_any_file
+    from calib_core.interchange.importing import read_any_file
+    from calib_core.interchange.own.calibration_json import consistent_file
 
     return consistent_file(read_any_file(path), str(path))
 

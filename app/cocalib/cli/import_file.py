@@ -17,10 +17,12 @@ from cocalib.platform.files import write_whole
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import CheckPairs, ImportedCalibration, TreeFile
+    from calib_core.interchange.check.pair_residuals import CheckPairs
+    from calib_core.interchange.format import ImportedCalibration
     from calib_core.interchange.hypotheses.found_poses import FoundPose
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.interchange.hypotheses.reading import UnstatedFile
+    from calib_core.interchange.trees.reading import TreeFile
     from calib_core.recordings import Recording
 
 
@@ -229,14 +231,11 @@ class Import:
 
     def run(self) -> int:
         """Write the calibration; return the exit code, as of no answer if its numbers may mean several things."""
-        from calib_core.interchange import (
-            Provenance,
-            adoption,
-            read_any_file,
-            read_camera_file,
-            read_check_pairs_file,
-        )
-        from calib_core.interchange import write_calibration as write
+        from calib_core.interchange.calibration_file import Provenance
+        from calib_core.interchange.cameras.files import read_camera_file
+        from calib_core.interchange.check.pair_residuals import read_check_pairs_file
+        from calib_core.interchange.importing import adoption, read_any_file
+        from calib_core.interchange.own.calibration_json import write_calibration as write
 
         if not self.calibration:
             raise InputError(

@@ -19,8 +19,9 @@ from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
-    from calib_core.intrinsics import Board, BoardSearch, CalibratedLens
-    from calib_core.intrinsics.coverage import Coverage
+    from calib_core.intrinsics.board import Board
+    from calib_core.intrinsics.calibrated_lens import CalibratedLens
+    from calib_core.intrinsics.coverage import BoardSearch, Coverage
     from calib_core.results import DataWarning
     from cocalib.intrinsics import OpenImages
     from cocalib.intrinsics.resumed_search import ResumedSearch
@@ -49,7 +50,7 @@ class BoardFlags:
         Raises:
             InputError: something about it is missing, or does not apply to this kind.
         """
-        from calib_core.intrinsics import board_of_size
+        from calib_core.intrinsics.board import board_of_size
 
         if self.board is None or self.square_mm is None:
             missing = " and ".join(
@@ -150,7 +151,7 @@ class Intrinsics:
             raise InputError(f"--to {self.to}: give the file to write with --out FILE")
 
     def _calibrate(self) -> int:
-        from calib_core.intrinsics import calibrate_lens
+        from calib_core.intrinsics.calibrating import calibrate_lens
         from calib_core.measurements import Unsolvable
         from cocalib.cli.board_searching import kept_on_interruption, search_for, searched
         from cocalib.cli.lens_output import left_out_lines

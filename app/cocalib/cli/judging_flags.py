@@ -17,7 +17,7 @@ from cocalib.platform.files import keep
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import ImportedCalibration
+    from calib_core.interchange.format import ImportedCalibration
     from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
     from calib_core.recordings import Recording
     from cocalib.evaluation.evaluating import EvidenceOptions
@@ -50,7 +50,7 @@ class EvidenceFlags:
         Raises:
             InputError: one is out of range.
         """
-        from calib_core.evaluation import TargetOptions
+        from calib_core.evaluation.moving_returns import TargetOptions
         from cocalib.evaluation.evaluating import EvidenceOptions
 
         if not 0.0 < self.min_speed_mps <= 100.0:
@@ -100,7 +100,7 @@ class EvidenceFlags:
                 if given:
                     raise InputError(f"{name} applies to boxes; give them with --boxes FILE_OR_TOPIC")
             return None, None
-        from calib_core.evaluation import renamed_classes
+        from calib_core.evaluation.counted_returns import renamed_classes
         from cocalib.evaluation.boxes import find_boxes, find_labels
 
         with progress_bar("reading boxes") as progress:
@@ -122,9 +122,10 @@ class EvidenceFlags:
         Raises:
             InputError: they cannot be read.
         """
-        from calib_core.interchange import read_clicks
+        from calib_core.interchange.own.clicks_json import read_clicks
         from cocalib.evaluation.recording_check import clicks_in
-        from cocalib.session.file import inspect_session, recording_session_folder
+        from cocalib.session.file.contents import inspect_session
+        from cocalib.session.file.finding import recording_session_folder
 
         if self.clicks is not None:
             clicks = read_clicks(read_text(self.clicks), source=str(self.clicks))
@@ -178,7 +179,7 @@ class JudgingFlags:
         Raises:
             InputError: they cannot be read.
         """
-        from calib_core.interchange import read_camera_file
+        from calib_core.interchange.cameras.files import read_camera_file
 
         return None if self.camera is None else read_camera_file(self.camera)
 

@@ -7,18 +7,13 @@ from typing import TextIO
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError, meant
-from calib_core.intrinsics import (
-    MODEL_ERRORS_UNSEEN,
-    BoardSearch,
-    CalibratedLens,
-    LeftOutImage,
-    projection_uncertainty,
-    residual_field,
-    split_difference,
-)
-from calib_core.intrinsics.coverage import Coverage
-from calib_core.words import in_sentences
+from calib_core.intrinsics.board_images import LeftOutImage
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.coverage import BoardSearch, Coverage
+from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_uncertainty, residual_field
+from calib_core.intrinsics.split_difference import split_difference
 from calib_core.words.intrinsics import halves_text, residuals_text
+from calib_core.words.outcomes import in_sentences
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
@@ -120,7 +115,7 @@ def convert_camera(path: Path, *, to: str | None, out: Path | None, size_px: tup
         out: file to write.
         size_px: width and height of images to which the camera is rescaled; None to keep its own.
     """
-    from calib_core.interchange import CameraFile
+    from calib_core.interchange.cameras.files import CameraFile
 
     camera = CameraFile.read(path, rescale=size_px is not None).camera(image_size_px=size_px)
     if out is None and to is None:
@@ -142,7 +137,7 @@ def write_camera(camera: Camera, to: str | None, out: Path | None, *, told: Text
     Raises:
         InputError: the format cannot hold it, or is binary and there is no file.
     """
-    from calib_core.interchange import camera_content
+    from calib_core.interchange.cameras.files import camera_content
 
     content = camera_content(camera, camera_format(to, out))
     if out is not None:
@@ -160,7 +155,7 @@ def require_format(to: str | None) -> None:
     Raises:
         InputError: it does not; the message names those that do.
     """
-    from calib_core.interchange import CAMERA_FORMATS
+    from calib_core.interchange.cameras.files import CAMERA_FORMATS
 
     if to is not None and to not in CAMERA_FORMATS:
         raise InputError(f"--to {to}: no such format for intrinsics; {meant(to, CAMERA_FORMATS)}")

@@ -75,7 +75,7 @@ def _serve(choice: "Choice | None", flags: ServingFlags, root: Path | None = Non
     """
     from cocalib.opening import Serving, serve
     from cocalib.opening.root_folder import RootFolder
-    from cocalib.session.file import recording_session_folder
+    from cocalib.session.file.finding import recording_session_folder
 
     folder = None if root is None else RootFolder(root)
     if choice is None:

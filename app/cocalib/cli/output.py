@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from calib_core.measurements import ReflectorClick, Unsolvable
     from calib_core.proposing import ViewProgress
     from calib_core.recordings import Recording
-    from calib_core.words import OptionPart, Words
+    from calib_core.words.text import OptionPart, Words
 
 
 def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:
@@ -28,7 +28,7 @@ def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -
         outcome: of the solver, or of the search for proposals.
         what: is missing.
     """
-    from calib_core.words import in_sentences
+    from calib_core.words.outcomes import in_sentences
 
     print(f"cocalib: {what}: {on_terminal(in_sentences(outcome))}", file=sys.stderr)
     for click in outcome.unpaired:
@@ -143,7 +143,7 @@ def tell_choices(recording: "Recording") -> None:
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
-    from calib_core.words import told
+    from calib_core.words.warnings import told
 
     _tell_notes([str(told(warning).message) for warning in recording.damage])
 

@@ -8,7 +8,7 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, Proposals
 from calib_core.proposing.proposals import named_proposals
-from calib_core.words import probability_text
+from calib_core.words.warnings import probability_text
 
 _HEAD = ("id", "time [s]", "range [m]", "column [px]", "row [px]", "sigma [px]", "confidence", "reason")
 

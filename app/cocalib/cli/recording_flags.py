@@ -23,7 +23,8 @@ from cocalib.cli.named_options import Settings, with_named
 from cocalib.platform.files import keep
 
 if TYPE_CHECKING:
-    from calib_core.interchange import CameraFile, VehicleNote
+    from calib_core.interchange.calibration_file import VehicleNote
+    from calib_core.interchange.cameras.files import CameraFile
     from calib_core.recordings import Recording
     from calib_core.recordings.selection import Need
 
@@ -107,7 +108,7 @@ class CameraFlags:
         Raises:
             InputError: it cannot be read.
         """
-        from calib_core.interchange import CameraFile
+        from calib_core.interchange.cameras.files import CameraFile
 
         return None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
 

@@ -14,7 +14,8 @@ from cocalib.cli.flags import OutFile, Output, OutputFlags, Switch, called
 from cocalib.platform.files import write_whole
 
 if TYPE_CHECKING:
-    from cocalib.session.file import Repair, SessionSummary
+    from cocalib.session.file.contents import Repair
+    from cocalib.session.file.finding import SessionSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class Session:
             raise InputError("session export needs the name of the new file: --out clicks.json")
 
     def _list(self) -> int:
-        from cocalib.session.file import session_summaries
+        from cocalib.session.file.finding import session_summaries
 
         for place in self.place:
             if not place.exists():
@@ -78,7 +79,7 @@ class Session:
         return 0
 
     def _repair(self, folder: Path) -> int:
-        from cocalib.session.file import inspect_session, repair_session
+        from cocalib.session.file.contents import inspect_session, repair_session
 
         found = repair_session(folder) if self.yes else inspect_session(folder)
         print(_printable("\n".join(_findings(found))))
@@ -98,8 +99,8 @@ class Session:
         return 1
 
     def _export(self, folder: Path) -> int:
-        from calib_core.interchange import write_clicks
-        from cocalib.session.file import inspect_session
+        from calib_core.interchange.own.clicks_json import write_clicks
+        from cocalib.session.file.contents import inspect_session
 
         assert self.out is not None
         found = inspect_session(folder)
@@ -116,7 +117,7 @@ def _session_folder(place: Path) -> Path:
     Raises:
         InputError: there is none.
     """
-    from cocalib.session.file import holds_session_files, recording_session_folder
+    from cocalib.session.file.finding import holds_session_files, recording_session_folder
 
     if not place.exists() and not place.is_symlink():
         raise InputError(f"{place}: no such folder; find sessions with cocalib session list FOLDER")

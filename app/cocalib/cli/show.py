@@ -89,7 +89,7 @@ class Show:
         if Show(out=out, recorded=self.recorded, output=self.output) != self:
             raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
         from calib_core.recordings import video_format, write_video
-        from calib_core.words import told
+        from calib_core.words.warnings import told
         from cocalib.solving.recorded_clicks import seconds_text
 
         video_format(out)
@@ -134,7 +134,8 @@ class Show:
             InputError: a file cannot be read, or is not of this recording.
             RecordingError: the recording cannot be opened.
         """
-        from calib_core.interchange import read_any_file, read_clicks
+        from calib_core.interchange.importing import read_any_file
+        from calib_core.interchange.own.clicks_json import read_clicks
         from cocalib.evaluation.boxes import find_boxes
         from cocalib.evaluation.recording_check import calibration_of
         from cocalib.recorded_view import recorded_view

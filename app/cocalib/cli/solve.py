@@ -36,10 +36,10 @@ from cocalib.cli.recording_flags import (
 )
 from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
-from cocalib.view import summary_lines
+from cocalib.view.build import summary_lines
 
 if TYPE_CHECKING:
-    from calib_core.interchange import VehicleNote
+    from calib_core.interchange.calibration_file import VehicleNote
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
     from cocalib.solving.automatic import PlacedClicks
@@ -256,8 +256,8 @@ class Solve:
 
 def _placed_words(placed: "PlacedClicks") -> str:
     """Say how many clicks were placed, and how sure they are."""
-    from calib_core.words import probability_text
     from calib_core.words.proposing import agreement_text
+    from calib_core.words.warnings import probability_text
 
     if placed.unconfirmed is None:
         return agreement_text(placed.agreement)

@@ -18,7 +18,12 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, TreeFile, WantedFrames
+    from calib_core.interchange.calibration_file import CalibrationFile
+    from calib_core.interchange.exporting import Export
+    from calib_core.interchange.format import ImportedCalibration
+    from calib_core.interchange.trees.frame_choice import WantedFrames
+    from calib_core.interchange.trees.frame_tree import FrameTree
+    from calib_core.interchange.trees.reading import TreeFile
     from calib_core.results import InputFile
 
 
@@ -34,7 +39,7 @@ class FrameFlags:
     @property
     def wanted(self) -> "WantedFrames":
         """What the user names."""
-        from calib_core.interchange import WantedFrames
+        from calib_core.interchange.trees.frame_choice import WantedFrames
 
         return WantedFrames(self.radar_frame, self.camera_frame)
 
@@ -63,7 +68,8 @@ class FrameFlags:
         Raises:
             InputError: a path cannot be read, or there is no pose between a radar and a camera.
         """
-        from calib_core.interchange import calibration_in_tree, read_together
+        from calib_core.interchange.importing import read_together
+        from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 
         found = self.files(paths) if files is None else files
         if found is None:
@@ -77,7 +83,8 @@ class FrameFlags:
         Raises:
             InputError: a name cannot be used.
         """
-        from calib_core.interchange import FrameNames, calibration_sha256
+        from calib_core.interchange.calibration_file import FrameNames
+        from calib_core.interchange.own.calibration_json import calibration_sha256
 
         known = file.frames
         frames = FrameNames(self.radar_frame or known.radar, self.camera_frame or known.camera)
@@ -108,7 +115,7 @@ class TreeFlags:
         Raises:
             InputError: the joint cannot be chosen or changed, or options contradict each other.
         """
-        from calib_core.interchange import patched
+        from calib_core.interchange.trees.patching import patched
 
         if to != "list":
             raise InputError("--into changes an existing file, --to writes a new one; give one of them")
@@ -137,7 +144,7 @@ class TreeFlags:
         Raises:
             InputError: the format cannot represent it, or it does not fit into the tree.
         """
-        from calib_core.interchange import attached_export, export
+        from calib_core.interchange.exporting import attached_export, export
 
         if self.joint is not None or self.write:
             raise InputError("--joint and --write are for --into FILE; give that too")
@@ -162,7 +169,7 @@ def _kept_files(paths: Sequence[Path]) -> "tuple[TreeFile, ...]":
     Raises:
         InputError: one cannot be read, or a folder contains none.
     """
-    from calib_core.interchange import files_beside, tree_files
+    from calib_core.interchange.importing import files_beside, tree_files
 
     files = tree_files(paths)
     for path in (Path(file.source) for file in files):
@@ -176,7 +183,9 @@ def _tree_of(paths: Sequence[Path]) -> "FrameTree":
     Raises:
         InputError: a path cannot be read, has no transforms, or they make no tree.
     """
-    from calib_core.interchange import Joint, Place, WrittenPose, joined_tree
+    from calib_core.interchange.format import WrittenPose
+    from calib_core.interchange.trees.frame_tree import Joint, Place
+    from calib_core.interchange.trees.reading import joined_tree
     from calib_core.recordings import frame_transforms
 
     recordings = [path for path in paths if _holds_recording(path)]

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, evaluation_document, residual_difference
-from calib_core.evaluation.paired_difference import Winner
+from calib_core.evaluation.evaluation_json import evaluation_document
+from calib_core.evaluation.figures import Evaluation
+from calib_core.evaluation.paired_difference import PairedDifference, Winner, acc_difference, residual_difference
 from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
 from calib_core.results import Calibration, DataWarning
-from calib_core.words import said_of
+from calib_core.words.outcomes import said_of
 from cocalib.evaluation.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
 
 _FITTED_SHARE = 0.5

@@ -10,19 +10,12 @@ from calib_core.arrays import TimesNs
 from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation import (
-    AssociatedPairs,
-    CountedReturns,
-    Evaluation,
-    TargetOptions,
-    associated_pairs,
-    counted_returns,
-    find_targets,
-    judged_by_boxes,
-    residual_figures,
-)
-from calib_core.evaluation.counted_returns import longest_gap_s
-from calib_core.evaluation.target_tracking import LONGEST_STEP_S
+from calib_core.evaluation.box_acc import judged_by_boxes
+from calib_core.evaluation.counted_returns import CountedReturns, counted_returns, longest_gap_s
+from calib_core.evaluation.figures import Evaluation
+from calib_core.evaluation.moving_returns import TargetOptions
+from calib_core.evaluation.residuals import AssociatedPairs, associated_pairs, residual_figures
+from calib_core.evaluation.target_tracking import LONGEST_STEP_S, find_targets
 from calib_core.measurements import NS_PER_S, Boxes, Pair, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, PairResult

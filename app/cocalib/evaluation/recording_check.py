@@ -11,8 +11,11 @@ from calib_core.association.pairing import RadarSource, pair_clicks, scans_aroun
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.evaluation.residuals import ResidualTest, residual_test
-from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
+from calib_core.interchange.check.report import CheckReport
+from calib_core.interchange.check.slips import CheckResult
+from calib_core.interchange.format import ImportedCalibration
+from calib_core.interchange.importing import adopted_calibration
 from calib_core.measurements import MIN_PAIRS, ReflectorClick
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, DataWarning, InputFile

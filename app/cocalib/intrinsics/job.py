@@ -7,19 +7,15 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from calib_core.errors import CalibrationError, InputError
-from calib_core.intrinsics import (
-    Board,
-    BoardCorners,
-    BoardImages,
-    BoardSearch,
-    CalibratedLens,
-    SearchProgress,
-    calibrate_lens,
-    search_boards,
-)
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import BoardCorners, BoardImages
+from calib_core.intrinsics.board_search import search_boards
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from calib_core.options import LensChoice
-from calib_core.words import outcome_told
+from calib_core.words.outcomes import outcome_told
 from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
-from calib_core.intrinsics import CalibratedLens, LensView
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
 from cocalib.hypothesis_sheet import png
 from cocalib.intrinsics.image_sources import OpenImages
 

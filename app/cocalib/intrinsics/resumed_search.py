@@ -6,7 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 from calib_core.interchange.own.board_views_json import BoardViews, runs_of
 from calib_core.interchange.own.lens_documents import ImageSource
-from calib_core.intrinsics import Board, BoardSearch, SearchProgress, search_boards
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_search import search_boards
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.image_sources import OpenImages
 

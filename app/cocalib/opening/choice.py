@@ -8,10 +8,10 @@ from typing import Literal, TypeAlias
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import CameraFile
+from calib_core.interchange.cameras.files import CameraFile
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
-from cocalib.web.messages import OpenWith, SessionPlan
+from cocalib.web.messages.opening_messages import OpenWith, SessionPlan
 
 ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]
 """What is opened together with a recording, and can be left out."""

@@ -15,42 +15,38 @@ import calib_core.recordings as recordings
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import ImportedCalibration, adopted_calibration, calibration_bytes, read_any
 from calib_core.interchange.cameras.camera_format import refuse_another_size
+from calib_core.interchange.format import ImportedCalibration
 from calib_core.interchange.hypotheses.found_poses import FoundPose
 from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of, likely_ones
 from calib_core.interchange.hypotheses.reading import UnstatedFile, as_imported, picked, read_unstated
+from calib_core.interchange.importing import adopted_calibration, calibration_bytes, read_any
 from calib_core.interchange.own.clicks_json import read_clicks_file
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 from calib_core.results import DataWarning
-from calib_core.words import in_sentences, told
+from calib_core.words.outcomes import in_sentences
+from calib_core.words.warnings import told
 from cocalib.hypothesis_sheet import Offer, OpenMeaning
 from cocalib.opening.choice import Choice, ChoicePart, GivenClicks, MeaningPick, UnusablePartError, part_of_choice
-from cocalib.session import (
-    AssumptionsConfirmed,
-    ClicksImported,
-    ColumnsMapped,
-    IntrinsicsChosen,
-    OptionsChanged,
-    RecordingFacts,
-)
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
-from cocalib.session.file import (
+from cocalib.session.events import AssumptionsConfirmed, ClicksImported, ColumnsMapped, IntrinsicsChosen, OptionsChanged
+from cocalib.session.file.contents import inspect_session
+from cocalib.session.file.finding import (
     FoundFolder,
-    SessionFileError,
     find_session_folder,
     has_session_of,
-    inspect_session,
     recording_session_folder,
     remembered_map,
-    set_aside,
     unused_session_folder,
 )
+from cocalib.session.file.guarded_folder import SessionFileError
+from cocalib.session.file.session_file import set_aside
+from cocalib.session.state import RecordingFacts
 from cocalib.solving.solving import camera_for
-from cocalib.view import Reference
-from cocalib.web.messages import SessionOffer
+from cocalib.view.reference import Reference
+from cocalib.web.messages.opening_messages import SessionOffer
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 
 _Ranked: TypeAlias = Callable[[str], tuple[Hypothesis, ...]]

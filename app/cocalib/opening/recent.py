@@ -16,7 +16,7 @@ from calib_core.input_files import name_text
 from calib_core.parsing import json_form
 from cocalib.platform.files import replace_file
 from cocalib.platform.resources import state_folder
-from cocalib.web.messages import RecentRecording
+from cocalib.web.messages.opening_messages import RecentRecording
 
 _MOST = 20
 _MOST_BYTES = 1 << 20

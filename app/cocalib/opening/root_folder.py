@@ -7,7 +7,7 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text, special_kind
-from cocalib.web.messages import FolderEntry, FolderListing
+from cocalib.web.messages.opening_messages import FolderEntry, FolderListing
 
 _MOST_ENTRIES = 2000
 _MOST_INSIDE = 500

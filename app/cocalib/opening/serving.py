@@ -12,7 +12,7 @@ from pathlib import Path
 import calib_core.recordings as recordings
 from calib_core.errors import CalibrationError, InputError, RecordingError
 from calib_core.input_files import name_text
-from calib_core.interchange import CameraFile
+from calib_core.interchange.cameras.files import CameraFile
 from calib_core.recordings import Recording, TopicSummary, first_image
 from cocalib.opening.choice import Choice, ChoicePart, UnusablePartError
 from cocalib.opening.opened import Opened, open_choice, session_offer, with_remembered
@@ -20,19 +20,18 @@ from cocalib.opening.recent import RecentRecordings
 from cocalib.opening.root_folder import RootFolder
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.solving.solving import camera_for, intrinsics_near
-from cocalib.view import sentence
-from cocalib.web.messages import (
+from cocalib.view.wording import sentence
+from cocalib.web.messages.opening_messages import (
     ChoicesWanted,
     DroppedFile,
     FolderWanted,
-    Opening,
     OpeningChoices,
     OpeningCommand,
     OpenWith,
-    Outgoing,
     RecentForgotten,
     TopicRow,
 )
+from cocalib.web.messages.outgoing import Opening, Outgoing
 from cocalib.web.port.link import Link
 from cocalib.web.port.serving import Service
 

@@ -6,18 +6,13 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.interchange.own.lens_documents import ImageSource
-from calib_core.intrinsics import (
-    MODEL_ERRORS_UNSEEN,
-    CalibratedLens,
-    ResidualField,
-    projection_uncertainty,
-    residual_field,
-    split_difference,
-)
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.coverage import Coverage
+from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, ResidualField, projection_uncertainty, residual_field
+from calib_core.intrinsics.split_difference import split_difference
 from calib_core.measurements import Unsolvable
-from calib_core.words import told
 from calib_core.words.intrinsics import halves_text, residuals_text
+from calib_core.words.warnings import told
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark, text

@@ -9,7 +9,10 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.input_files import name_text
-from calib_core.interchange import CheckResult, ImportedCalibration, compare, imported, read_calibration
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.check.slips import CheckResult
+from calib_core.interchange.format import ImportedCalibration, imported
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import TimeNs, time_parts
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, DataWarning, InputFile

@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
-from calib_core.evaluation import ResidualFigures
+from calib_core.evaluation.figures import ResidualFigures
 from calib_core.measurements import ReflectorClick
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult

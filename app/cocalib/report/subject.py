@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
-from calib_core.evaluation import Evaluation
-from calib_core.interchange import Comparison, FrameNames, ImportedCalibration
+from calib_core.evaluation.figures import Evaluation
+from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.check.agreement import Comparison
+from calib_core.interchange.format import ImportedCalibration
 from calib_core.measurements import ReflectorClick
 from calib_core.results import Calibration, DataWarning, InputFile
 

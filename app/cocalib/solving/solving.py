@@ -13,28 +13,20 @@ from calib_core.calibration import calibrate_pairs, calibration_steps, solve_aga
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
 from calib_core.input_files import name_text
-from calib_core.interchange import (
-    CALIBRATION_SCHEMA,
-    AssumptionNote,
-    CalibrationFile,
-    CameraFile,
-    FrameNames,
-    Provenance,
-    VehicleNote,
-    names_schema,
-    read_calibration,
-    read_pairs,
-    read_pairs_table,
-)
-from calib_core.interchange import calibration_text as interchange_text
+from calib_core.interchange.calibration_file import AssumptionNote, CalibrationFile, FrameNames, Provenance, VehicleNote
+from calib_core.interchange.cameras.files import CameraFile
+from calib_core.interchange.own.calibration_json import calibration_text as interchange_text
+from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
+from calib_core.interchange.own.pairs_files import read_pairs, read_pairs_table
 from calib_core.measurements import Candidate, DataWarning, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import damaged_recording, lost_returns
-from calib_core.words import told
+from calib_core.words.warnings import told
 from cocalib.platform.resources import version
-from cocalib.session import Outcome
+from cocalib.session.state import Outcome
 
 _MOST_CANDIDATES = 50
 """As many as the option allows."""

@@ -15,7 +15,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 from cocalib.evaluation.evaluating import check_clicks
 from cocalib.platform.error_boundary import report_of
-from cocalib.session import Solved
+from cocalib.session.events import Solved
 from cocalib.solving.solving import solve_in_steps
 
 _log = logging.getLogger(__name__)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.evaluation import BoxFigures, Evaluation, Sensitivity
-from calib_core.evaluation.figures import Axis, ClassFigure
+from calib_core.evaluation.figures import Axis, BoxFigures, ClassFigure, Evaluation, Sensitivity
 from calib_core.evaluation.sentences import NOT_ACCURACY, sensitivity_sentences
 from cocalib.view.model import Figure, WarningRow, warning_row
 from cocalib.view.wording import sentence

@@ -21,22 +21,19 @@ from calib_core.results.actions import (
     SetOption,
 )
 from calib_core.results.verdict import SURE_PAIRS, Verdict, by_consequence, consequence_of, stated_error, verdict_on
-from calib_core.words import (
-    Words,
+from calib_core.words.outcomes import in_sentences
+from calib_core.words.text import Words, named, say, sentence, words
+from calib_core.words.verdict import (
     action_of,
     action_words,
     assumed_words,
     error_text,
-    in_sentences,
-    named,
     placement_words,
-    say,
-    sentence,
     verdict_line,
     verdict_rest,
-    words,
 )
-from cocalib.session import History, RecordingFacts, Session
+from cocalib.session.applying import History
+from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.click_rows import click_rows
 from cocalib.view.figures import (
     assumed_figures,

@@ -11,7 +11,7 @@ from calib_core.estimation.pair_results import CandidateFit, candidate_fits
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.view.wording import position_words
 
 _FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom

@@ -13,8 +13,8 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from calib_core.results.calibration import CHI2_95_2
-from calib_core.words import in_sentences
-from cocalib.session import RecordingFacts, Session
+from calib_core.words.outcomes import in_sentences
+from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.model import ClickRow, ClickState, Ellipse
 from cocalib.view.wording import plain, position_words
 

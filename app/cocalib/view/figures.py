@@ -12,9 +12,9 @@ from calib_core.results.actions import ReduceError
 from calib_core.results.radar_axes import sigma_in_radar_axes
 from calib_core.results.systematic_errors import SystematicErrorResult, family_of, is_determined
 from calib_core.results.verdict import verdict_on
-from calib_core.words import Words
-from calib_core.words import sentence as in_sentence
 from calib_core.words.systematic_errors import FAMILIES, dominant_sentence, error_words
+from calib_core.words.text import Words
+from calib_core.words.text import sentence as in_sentence
 from cocalib.view.click_rows import reprojections
 from cocalib.view.model import Figure, Level, SystematicErrorRow, SystematicErrorTable
 from cocalib.view.wording import plain, sentence, with_sigma

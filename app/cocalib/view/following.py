@@ -5,7 +5,7 @@ from typing import Literal
 
 from calib_core.diagnostics.next_placement import ENOUGH_PLACEMENTS, Coverage, Place
 from calib_core.results import NextPlacement
-from calib_core.words import placement_words
+from calib_core.words.verdict import placement_words
 
 FollowState = Literal["live", "quiet", "complete", "ended"]
 

@@ -10,8 +10,9 @@ from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.actions import SetOption
 from calib_core.results.verdict import VerdictLevel
-from calib_core.words import Words, sentence, told, words
-from cocalib.session import DismissedPlacement
+from calib_core.words.text import Words, sentence, words
+from calib_core.words.warnings import told
+from cocalib.session.state import DismissedPlacement
 
 Level: TypeAlias = Literal["none", "plain", "good", "warning"]
 

@@ -5,9 +5,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.interchange import CalibrationFile, Comparison, PixelDifference, compare, imported
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.check.agreement import Comparison, compare
+from calib_core.interchange.check.pixel_differences import PixelDifference
+from calib_core.interchange.format import imported
 from calib_core.results import Calibration
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.view.model import Figure
 from cocalib.view.wording import plain, with_sigma
 

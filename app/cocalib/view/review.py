@@ -9,13 +9,16 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.estimation.pair_results import expected_shares
-from calib_core.interchange import CalibrationFile, ImportedCalibration, compare, imported
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from calib_core.results.calibration import CHI2_95_2
-from calib_core.words import Words, join, named, said_of, say, words
-from cocalib.session import History
+from calib_core.words.outcomes import said_of
+from calib_core.words.text import Words, join, named, say, words
+from cocalib.session.applying import History
 from cocalib.view.model import Figure
 from cocalib.view.wording import direction_words, plain, sentence
 

@@ -4,7 +4,7 @@ import math
 
 from calib_core.arrays import Vector3
 from calib_core.radar import polar_from_cartesian
-from calib_core.words import sentence as in_sentence
+from calib_core.words.text import sentence as in_sentence
 
 
 def sentence(phrase: str) -> str:

@@ -11,15 +11,10 @@ from calib_core.arrays import Vector2
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
-from calib_core.interchange import (
-    CalibrationFile,
-    Format,
-    FrameNames,
-    ImportedCalibration,
-    WrittenPose,
-    parent_pose,
-    written_formats,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.exporting import parent_pose
+from calib_core.interchange.format import Format, ImportedCalibration, WrittenPose
+from calib_core.interchange.formats.registry import written_formats
 from calib_core.measurements import TimeNs
 
 _ORDERS = {

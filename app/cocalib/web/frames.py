@@ -15,7 +15,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.recordings import Recording
-from cocalib.web.messages import FrameHeader
+from cocalib.web.messages.outgoing import FrameHeader
 
 Size = Literal["full", "half", "thumbnail", "rectified"]
 

@@ -13,9 +13,10 @@ from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import RadarErrors, polar_from_cartesian
 from calib_core.results import Calibration
-from cocalib.session import Session
-from cocalib.view import Reference, shown_calibration
-from cocalib.web.messages import Overlay, OverlayGuess, RadarLook, RadarReturn
+from cocalib.session.state import Session
+from cocalib.view.reference import Reference, shown_calibration
+from cocalib.web.messages.outgoing import Overlay, OverlayGuess
+from cocalib.web.messages.space_messages import RadarLook, RadarReturn
 
 _NEAREST_WITHIN_S = 0.3
 _MOST_RETURNS = 4000

@@ -15,7 +15,8 @@ from calib_core.interchange.own.lens_documents import (
     ImageSource,
 )
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
-from calib_core.intrinsics import Board, BoardCorners, LeftOutImage
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 from calib_core.measurements import TimeNs
 
 _LONGEST_NAME = 200

@@ -65,7 +65,8 @@ from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
 from calib_core.results import Calibration, CheckPoint, PairResult
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.verdict import verdict_on
-from calib_core.words import stated_verdict, unpaired_text, warning_text
+from calib_core.words.outcomes import unpaired_text, warning_text
+from calib_core.words.verdict import stated_verdict
 
 _SHOWN = 200
 """Characters of unknown keys."""

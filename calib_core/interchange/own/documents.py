@@ -23,7 +23,8 @@ from calib_core.parsing import json_form
 from calib_core.radar import RadarErrors
 from calib_core.results import InputFile, Metrics, UnconfirmedClicks
 from calib_core.results.systematic_errors import SystematicErrorResult
-from calib_core.words import StatedVerdict, UnpairedText, WarningText
+from calib_core.words.outcomes import UnpairedText, WarningText
+from calib_core.words.verdict import StatedVerdict
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"

@@ -19,17 +19,12 @@ from calib_core.interchange.own.lens_documents import (
     UncertaintyDocument,
 )
 from calib_core.interchange.syntax.strict_json import document_text
-from calib_core.intrinsics import (
-    MODEL_ERRORS_UNSEEN,
-    CalibratedLens,
-    LensView,
-    projection_uncertainty,
-    residual_field,
-    split_difference,
-)
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
 from calib_core.intrinsics.coverage import Coverage
-from calib_core.words import warning_text
+from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_uncertainty, residual_field
+from calib_core.intrinsics.split_difference import split_difference
 from calib_core.words.intrinsics import halves_text, residuals_text
+from calib_core.words.outcomes import warning_text
 
 
 def write_intrinsics(

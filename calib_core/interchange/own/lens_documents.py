@@ -6,9 +6,10 @@ import msgspec
 from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import CameraDocument
-from calib_core.intrinsics import Board, LeftOutImage
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import LeftOutImage
 from calib_core.json_forms import Count, Measured, Name, Pixel
-from calib_core.words import WarningText
+from calib_core.words.outcomes import WarningText
 
 BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"

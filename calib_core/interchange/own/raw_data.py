@@ -11,7 +11,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, choose_chec
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.measurements import Unsolvable
 from calib_core.radar import RadarErrors
-from calib_core.words import said_of
+from calib_core.words.outcomes import said_of
 
 
 def aed_either_way(file: CalibrationFile) -> tuple[float, float] | None:

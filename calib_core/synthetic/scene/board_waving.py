@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.synthetic.boards import BoardMotion, MovingBoard, PrintedBoard, checkerboard, printed_board, waved_poses
 
 WAVED_BOARD = Board("checkerboard", 9, 6, 0.02214)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.recordings import Recording, open_recording
 

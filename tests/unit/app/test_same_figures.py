@@ -6,20 +6,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.evaluation import box_figures, moving_targets
+from calib_core.evaluation.box_acc import box_figures
+from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import CalibrationFile, check, compare, imported
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.check.report import check
+from calib_core.interchange.format import imported
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.evaluation.evaluating import evaluate_recording
-from cocalib.session import History, RecordingFacts, Session
+from cocalib.session.applying import History
+from cocalib.session.state import RecordingFacts, Session
 from cocalib.solving.solving import solve_clicks
-from cocalib.view import Reference, view
 from cocalib.view.acc_panel import acc_panel
+from cocalib.view.build import view
+from cocalib.view.reference import Reference
 from cocalib.view.wording import plain, with_sigma
-from cocalib.web.messages import encode
+from cocalib.web.messages.outgoing import encode
 from tests.street_recording import StreetRecording, reference_calibration
 
 

@@ -10,23 +10,15 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, Unsolvable
-from cocalib.session import (
-    ChosenIntrinsics,
-    ClickPlaced,
-    ClickRemoved,
-    EventError,
-    History,
-    IntrinsicsChosen,
-    OptionsChanged,
-    RecordingFacts,
-    Solved,
-    Step,
-    Undo,
-)
-from cocalib.session.file import Closed, Restored, SessionFileError
-from cocalib.view import View, view
+from cocalib.session.applying import EventError, History
+from cocalib.session.events import ClickPlaced, ClickRemoved, IntrinsicsChosen, OptionsChanged, Solved, Step, Undo
+from cocalib.session.file.guarded_folder import SessionFileError
+from cocalib.session.file.session_file import Closed, Restored
+from cocalib.session.state import ChosenIntrinsics, RecordingFacts
+from cocalib.view.build import view
+from cocalib.view.model import View
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)

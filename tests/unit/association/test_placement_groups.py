@@ -12,7 +12,7 @@ from calib_core.association.pairing import balanced_pairs, pair_clicks, scores_o
 from calib_core.association.placement_groups import linked_clicks, placement_groups
 from calib_core.association.placements import find_placements
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
-from calib_core.interchange import calibration_text
+from calib_core.interchange.own.calibration_json import calibration_text
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import cartesian_from_polar

@@ -15,7 +15,7 @@ from mcap_ros2.decoder import DecoderFactory as Ros2Decoder
 from calib_core.camera import Camera
 from calib_core.deployment import RecordingWritten, write_into_recording
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import CalibrationFile, FrameNames, choose_check_point
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, choose_check_point
 from calib_core.measurements import NS_PER_S
 from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors

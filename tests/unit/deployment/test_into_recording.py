@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from calib_core.errors import InputError
-from calib_core.interchange import read_calibration, write_calibration
+from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
 from calib_core.radar import RadarErrors
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers.writing import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE

@@ -29,7 +29,7 @@ from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.rig import random_rig
 from calib_core.synthetic.simulated_pairs import NOISE_PROFILES, NoiseName, study_camera
-from calib_core.words import told
+from calib_core.words.warnings import told
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.scans import scan_of
 

@@ -11,12 +11,12 @@ from calib_core.calibration import calibrate_pairs, preview_pairs, solve_again
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import OptionError
 from calib_core.evaluation.residuals import residual_test
-from calib_core.interchange import calibration_text, read_calibration
+from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, RefiningOptions
 from calib_core.results import Calibration
 from calib_core.results.actions import CalibrateLens
-from calib_core.words import told
+from calib_core.words.warnings import told
 from cocalib.view.figures import refined_sentences
 
 TOLD = WrongLens("focal 2 %", refined=True, scale_told=True, alone=True)

@@ -7,8 +7,9 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation import box_figures, counted_returns, moving_targets, renamed_classes
-from calib_core.evaluation.box_acc import grouped_error, judged_by_boxes
+from calib_core.evaluation.box_acc import box_figures, grouped_error, judged_by_boxes
+from calib_core.evaluation.counted_returns import counted_returns, renamed_classes
+from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import (
     NS_PER_S,

@@ -8,16 +8,11 @@ import pytest
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.evaluation import (
-    acc_difference,
-    associated_pairs,
-    box_figures,
-    moving_targets,
-    residual_difference,
-    residual_figures,
-)
+from calib_core.evaluation.box_acc import box_figures
 from calib_core.evaluation.figures import ResidualFigures, edges_of, spreads
-from calib_core.evaluation.residuals import held_out, residual_test
+from calib_core.evaluation.paired_difference import acc_difference, residual_difference
+from calib_core.evaluation.residuals import associated_pairs, held_out, residual_figures, residual_test
+from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Pair, TimeNs
 from calib_core.options import CalibrationOptions

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from calib_core.evaluation import NOT_ACCURACY, Evaluation, evaluation_lines, sensitivity_sentences
-from calib_core.evaluation.figures import BoxFigures, ClassFigure, FrameFigure, Sensitivity, Share
+from calib_core.evaluation.figures import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
+from calib_core.evaluation.sentences import NOT_ACCURACY, evaluation_lines, sensitivity_sentences
 from calib_core.measurements import TimeNs
 
 ANGLES = (-1.0, 0.0, 1.0)

@@ -11,27 +11,21 @@ import pytest
 from calib_core.calibration import preview_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
-    AgreementLimits,
+from calib_core.interchange.calibration_file import (
     CalibrationFile,
-    CheckReport,
     FrameNames,
-    ImportedCalibration,
     Provenance,
     VehicleNote,
-    adopt,
-    check,
     choose_check_point,
-    compare,
-    export,
-    format_named,
-    imported,
-    read_any,
-    read_check_pairs,
-    read_check_pairs_file,
-    write_calibration,
 )
+from calib_core.interchange.check.agreement import AgreementLimits, compare
+from calib_core.interchange.check.pair_residuals import read_check_pairs, read_check_pairs_file
+from calib_core.interchange.check.report import CheckReport, check
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import ImportedCalibration, imported
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.synthetic import random_rig, simulate_pairs
 

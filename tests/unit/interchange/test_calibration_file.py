@@ -16,35 +16,34 @@ from hypothesis import strategies as st
 import calib_core as cc
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
+from calib_core.interchange.calibration_file import (
+    MOST_CHARACTERS,
     AssumptionNote,
     CalibrationFile,
     Provenance,
     VehicleNote,
-    adopt,
+)
+from calib_core.interchange.check.pair_residuals import read_check_pairs
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import contents_text, export
+from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import FORMATS
+from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.own.calibration_json import (
+    calibration_file,
     calibration_text,
-    check,
-    contents_text,
-    export,
-    for_raw,
-    imported,
-    read_any,
     read_calibration,
-    read_check_pairs,
-    read_pairs,
     write_calibration,
 )
-from calib_core.interchange.calibration_file import MOST_CHARACTERS
-from calib_core.interchange.own.calibration_json import calibration_file
-from calib_core.interchange.own.raw_data import aed_either_way
+from calib_core.interchange.own.pairs_files import read_pairs
+from calib_core.interchange.own.raw_data import aed_either_way, for_raw
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import SystematicErrors, simulate_pairs
-from calib_core.words import stated_verdict
+from calib_core.words.verdict import stated_verdict
 
 
 @pytest.fixture

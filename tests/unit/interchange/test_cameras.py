@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from calib_core.camera import CAMERA_MODELS, Camera, CameraCovariance
 from calib_core.errors import InputError
-from calib_core.interchange import (
+from calib_core.interchange.cameras.files import (
     CAMERA_FORMATS,
     CameraFile,
     camera_content,

@@ -14,24 +14,15 @@ from scipy.io import loadmat, savemat
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    FrameNames,
-    adoption,
-    check,
-    compare,
-    contents_text,
-    export,
-    format_named,
-    imported,
-    read_any,
-    read_any_file,
-    read_camera,
-    write_calibration,
-)
-from calib_core.interchange.check.report import CheckedFile, check_json
-from calib_core.interchange.own.calibration_json import calibration_file
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.check.report import CheckedFile, check, check_json
+from calib_core.interchange.exporting import contents_text, export
+from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import adoption, read_any, read_any_file
+from calib_core.interchange.own.calibration_json import calibration_file, write_calibration
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack

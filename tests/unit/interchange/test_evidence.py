@@ -10,25 +10,15 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    Format,
-    ImportedCalibration,
-    adopt,
-    adoption,
-    check,
-    export,
-    format_named,
-    imported,
-    read_any,
-    read_calibration,
-    read_check_pairs,
-    write_calibration,
-)
-from calib_core.interchange.calibration_file import EVIDENCE_LEVELS
+from calib_core.interchange.calibration_file import EVIDENCE_LEVELS, CalibrationFile
+from calib_core.interchange.check.pair_residuals import read_check_pairs
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import Format, ImportedCalibration, imported
+from calib_core.interchange.formats.registry import FORMATS, format_named
 from calib_core.interchange.formats.statement import stated_origin
-from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.importing import adopt, adoption, read_any
+from calib_core.interchange.own.calibration_json import calibration_sha256, read_calibration, write_calibration
 
 
 def text_of(file: CalibrationFile, name: str) -> str:

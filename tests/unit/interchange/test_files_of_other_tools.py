@@ -10,8 +10,11 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import FrameNames, WantedFrames, export, read_any, read_any_file
+from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.exporting import export
 from calib_core.interchange.formats.pose_parts import direction_by_facing
+from calib_core.interchange.importing import read_any, read_any_file
+from calib_core.interchange.trees.frame_choice import WantedFrames
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
 POSITION, TURN = FORWARD[:3], FORWARD[3:]

@@ -9,17 +9,18 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.interchange import (
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import (
     CAMERA_ONLY,
     FORMATS,
-    check,
-    export,
+    GROUP,
     format_named,
-    imported,
-    read_any,
+    plugin_formats,
     written_formats,
 )
-from calib_core.interchange.formats.registry import GROUP, plugin_formats
+from calib_core.interchange.importing import read_any
 from cocalib.cli import run
 from cocalib.web.channel.export_preview import export_preview
 from cocalib.web.exports import format_rows

@@ -16,18 +16,14 @@ import jsonschema
 import numpy as np
 import pytest
 
-from calib_core.interchange import (
-    CAMERA_ONLY,
-    FORMATS,
-    Content,
-    export,
-    read_calibration,
-    read_camera,
-    read_clicks,
-    read_pairs,
-    write_calibration,
-)
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.exporting import export
+from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
+from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
+from calib_core.interchange.own.clicks_json import read_clicks
+from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.own.schemas import schema_texts
+from calib_core.interchange.syntax.content import Content
 from calib_core.radar import AngleMap, RadarErrors
 
 

@@ -11,28 +11,19 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs, solve_again
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FrameNames,
-    Provenance,
-    calibration_text,
-    choose_check_point,
-    read_calibration,
-    read_clicks,
-    read_pairs,
-    read_pairs_table,
-    write_calibration,
-    write_clicks,
-    write_pairs,
-)
+from calib_core.interchange.calibration_file import FrameNames, Provenance, choose_check_point
 from calib_core.interchange.own.board_views_json import (
     BoardViews,
     read_board_views,
     runs_of,
     write_board_views,
 )
-from calib_core.interchange.own.clicks_json import read_clicks_file
+from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
+from calib_core.interchange.own.clicks_json import read_clicks, read_clicks_file, write_clicks
 from calib_core.interchange.own.lens_documents import ImageSource
-from calib_core.intrinsics import BoardCorners, board_of_size
+from calib_core.interchange.own.pairs_files import read_pairs, read_pairs_table, write_pairs
+from calib_core.intrinsics.board import board_of_size
+from calib_core.intrinsics.board_images import BoardCorners
 from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, UnconfirmedClicks

@@ -11,17 +11,13 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    check,
-    choose_check_point,
-    contents_text,
-    export,
-    imported,
-    read_any,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, choose_check_point
 from calib_core.interchange.cameras.rectification import rectified_camera
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import contents_text, export
+from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import FORMATS
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from cocalib.opening.opened import camera_of
 from cocalib.web.channel.export_preview import export_preview, exported

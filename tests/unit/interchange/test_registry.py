@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
-    CalibrationFile,
-    FrameNames,
-    choose_check_point,
-    export,
-    export_all,
-    format_named,
-    read_any,
-    written_formats,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, choose_check_point
+from calib_core.interchange.exporting import export, export_all
 from calib_core.interchange.formats import registry
-from calib_core.interchange.formats.registry import readers
+from calib_core.interchange.formats.registry import FORMATS, format_named, readers, written_formats
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
 

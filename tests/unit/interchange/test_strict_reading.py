@@ -16,15 +16,11 @@ from calib_core import parsing
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import (
-    CalibrationFile,
-    check,
-    choose_check_point,
-    export,
-    read_any,
-    read_calibration,
-    write_calibration,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, choose_check_point
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import export
+from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
 
 
 def with_camera(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:

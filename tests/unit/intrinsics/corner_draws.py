@@ -6,7 +6,9 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
-from calib_core.intrinsics import BoardCorners, BoardSearch, board_of_size
+from calib_core.intrinsics.board import board_of_size
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.coverage import BoardSearch
 
 BOARD = board_of_size("9x6", 25.0)
 SIZE_PX = (1280, 720)

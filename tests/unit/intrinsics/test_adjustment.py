@@ -9,9 +9,11 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
-from calib_core.intrinsics import BoardCorners, CalibratedLens, calibrate_lens
 from calib_core.intrinsics.adjustment import SharedCovariance, adjust, pose_views, reduced, shared_covariance, start
 from calib_core.intrinsics.bad_views import judge_views, mirror_twins
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.calibrating import calibrate_lens
 from calib_core.intrinsics.linearization import (
     Freedom,
     LensState,

@@ -12,16 +12,11 @@ import pytest
 from benchmarks.boards import BoardFilm, render_board, true_corners
 from calib_core.camera import Camera, CameraModel
 from calib_core.errors import InputError, RecordingError
-from calib_core.intrinsics import (
-    Board,
-    BoardSearch,
-    SearchProgress,
-    board_of_size,
-    board_search,
-    search_boards,
-)
+from calib_core.intrinsics import board_search
+from calib_core.intrinsics.board import Board, board_of_size
 from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
-from calib_core.intrinsics.board_search import ImageOrder
+from calib_core.intrinsics.board_search import ImageOrder, search_boards
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import TimeNs, Unsolvable
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses

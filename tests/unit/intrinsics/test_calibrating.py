@@ -8,18 +8,12 @@ import pytest
 
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_from_euler
-from calib_core.intrinsics import (
-    BoardCorners,
-    CalibratedLens,
-    Coverage,
-    LensView,
-    calibrate_lens,
-    projection_uncertainty,
-    residual_field,
-    split_difference,
-    view_coverage,
-)
-from calib_core.intrinsics.image_maps import far_point_slopes
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
+from calib_core.intrinsics.calibrating import calibrate_lens
+from calib_core.intrinsics.coverage import Coverage, view_coverage
+from calib_core.intrinsics.image_maps import far_point_slopes, projection_uncertainty, residual_field
+from calib_core.intrinsics.split_difference import split_difference
 from calib_core.measurements import Unsolvable
 from calib_core.synthetic import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of

@@ -11,7 +11,12 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, camera_info_text, export, read_any, read_calibration, read_camera
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.exporting import export
+from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.lens_models.brown_conrady import project_distorted, unproject_distorted
 from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
 from calib_core.lens_models.registry import LENS_MODELS

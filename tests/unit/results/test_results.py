@@ -13,7 +13,7 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import acc, aed, cdsd, inside_boxes, metrics_of, rms
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.words import said_of
+from calib_core.words.outcomes import said_of
 
 POINT = np.array([[8.0, 0.5, 0.0]])
 

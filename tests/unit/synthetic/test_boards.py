@@ -10,7 +10,7 @@ from benchmarks.boards import BoardFilm, render_board, true_corners
 from calib_core.camera import Camera, CameraModel
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log
-from calib_core.intrinsics import Board
+from calib_core.intrinsics.board import Board
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import grid_rays, waved_poses
 

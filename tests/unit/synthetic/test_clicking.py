@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.synthetic import SimulatedRecording, SimulationOptions, simulate
 from calib_core.synthetic.files import clicks_text, truth_text
 from calib_core.synthetic.options import Clicking

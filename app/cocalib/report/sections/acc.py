@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calib_core.evaluation import BoxFigures, Sensitivity, Share
+from calib_core.evaluation.figures import BoxFigures, Sensitivity, Share
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, polyline, text
 from cocalib.view.wording import plain, sentence

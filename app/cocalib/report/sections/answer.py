@@ -3,11 +3,11 @@
 import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
-from calib_core.interchange import CalibrationFile
+from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
-from calib_core.words import stated_verdict
+from calib_core.words.verdict import stated_verdict
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import drawing, rounded_step, text
 from cocalib.report.subject import ReportSubject

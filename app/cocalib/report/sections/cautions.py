@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from calib_core.results import DataWarning
 from calib_core.results.verdict import by_consequence, consequence_of
-from calib_core.words import in_sentences, told
+from calib_core.words.outcomes import in_sentences
+from calib_core.words.warnings import told
 from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence

@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from calib_core.camera import Camera
-from calib_core.interchange import VehicleNote
+from calib_core.interchange.calibration_file import VehicleNote
 from calib_core.options import CalibrationOptions
 from calib_core.results import InputFile
 from cocalib.report.markup import Markup, scrolled, tag

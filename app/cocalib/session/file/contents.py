@@ -6,7 +6,8 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick
-from cocalib.session import AxesStated, History, RecordingFacts, Step, advance
+from cocalib.session.applying import History, advance
+from cocalib.session.events import AxesStated, Step
 from cocalib.session.file.guarded_folder import FolderLock, GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm, facts_of, require_same_recording
 from cocalib.session.file.journal import (
@@ -18,6 +19,7 @@ from cocalib.session.file.journal import (
     following,
     read_journal,
 )
+from cocalib.session.state import RecordingFacts
 
 
 @dataclass(frozen=True, slots=True)

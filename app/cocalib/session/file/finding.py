@@ -10,11 +10,12 @@ from pathlib import Path
 
 from calib_core.results import DataWarning
 from cocalib.platform.resources import SESSION_SUFFIX, state_folder, user_session_folder
-from cocalib.session import ColumnsMapped, RecordingFacts
+from cocalib.session.events import ColumnsMapped
 from cocalib.session.file.contents import inspect_session
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError, lock_holder
 from cocalib.session.file.identity import RecordingForm, has_dates, is_same_recording
 from cocalib.session.file.journal import COPY, JOURNAL, read_journal
+from cocalib.session.state import RecordingFacts
 
 _HEAD_BYTES = 1 << 16
 _FILES = (JOURNAL, COPY)

@@ -9,8 +9,8 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import Stamp, TimeNs
-from cocalib.session import RecordingFacts
 from cocalib.session.file.guarded_folder import SessionFileError
+from cocalib.session.state import RecordingFacts
 
 _FIRST_DATE_S = 631_152_000
 """Earlier stamps count from the start of the recording, or of a simulation: 1990."""

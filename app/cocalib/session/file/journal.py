@@ -16,7 +16,7 @@ import msgspec
 from calib_core.errors import CalibrationError, InputError
 from calib_core.json_forms import to_json
 from calib_core.parsing import json_form
-from cocalib.session import JournalStep, Step
+from cocalib.session.events import JournalStep, Step
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm
 

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from calib_core.results import DataWarning
 from cocalib.platform.resources import user_session_folder, version
-from cocalib.session import AxesStated, History, RecordingFacts, Step
+from cocalib.session.applying import History
+from cocalib.session.events import AxesStated, Step
 from cocalib.session.file.contents import Contents, read_contents, rewrite
 from cocalib.session.file.guarded_folder import FolderLock, GuardedFolder, SessionFileError
 from cocalib.session.file.identity import recording_form
 from cocalib.session.file.journal import COPY, JOURNAL, Journal, SealedLine, bytes_of, first_line
+from cocalib.session.state import RecordingFacts
 
 
 @dataclass(frozen=True, slots=True)

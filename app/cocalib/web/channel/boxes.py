@@ -15,10 +15,12 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.view import sentence, shown_calibration
 from cocalib.view.acc_panel import AccPanel, acc_panel
+from cocalib.view.reference import shown_calibration
+from cocalib.view.wording import sentence
 from cocalib.web.channel.outbox import Outbox
-from cocalib.web.messages import BoxesWanted, MovingBoxesWanted, Outgoing, Progress, encode
+from cocalib.web.messages.incoming import BoxesWanted, MovingBoxesWanted
+from cocalib.web.messages.outgoing import Outgoing, Progress, encode
 from cocalib.workspace import Workspace
 
 _WHAT_MOVES = "what moves"

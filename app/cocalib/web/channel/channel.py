@@ -16,9 +16,11 @@ from calib_core.measurements import Candidate, RadarScan, RadarScans, ReflectorC
 from calib_core.proposing.apex import Apex, NoApex, find_apex
 from calib_core.results import Calibration
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.session import Session, Step
+from cocalib.session.events import Step
+from cocalib.session.state import Session
 from cocalib.solving.solving import window_candidates
-from cocalib.view import PairCandidates, click_candidates, pair_of_click, sentence
+from cocalib.view.candidates import PairCandidates, click_candidates, pair_of_click
+from cocalib.view.wording import sentence
 from cocalib.web.channel.desk import answer_of
 from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.outbox import NewestWins, Outbox, Shown
@@ -26,32 +28,26 @@ from cocalib.web.channel.radar_survey import placements_at
 from cocalib.web.channel.review import ReviewDesk
 from cocalib.web.channel.space_feed import SpaceFeed
 from cocalib.web.frames import Frame, FrameStore
-from cocalib.web.messages import (
+from cocalib.web.messages.incoming import (
     BoxesWanted,
     Command,
     CursorMoved,
-    Done,
     FrameWanted,
     Hello,
     ImportWanted,
     Incoming,
-    LensCalibrate,
-    LensCancel,
-    LensUse,
     MovingBoxesWanted,
-    OpeningCommand,
-    Problem,
     ProposingSwitch,
     ReviewRequest,
-    Snapped,
     SnapWanted,
     ViewpointWanted,
     ViewWanted,
-    encode,
-    encode_frame,
     parse,
     request_of,
 )
+from cocalib.web.messages.lens_messages import LensCalibrate, LensCancel, LensUse
+from cocalib.web.messages.opening_messages import OpeningCommand
+from cocalib.web.messages.outgoing import Done, Problem, Snapped, encode, encode_frame
 from cocalib.web.radar_sight import look_of, overlay_of
 from cocalib.web.view3d.scene import TabScene
 

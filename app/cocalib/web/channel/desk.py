@@ -4,7 +4,9 @@ import asyncio
 from typing import Protocol
 
 from calib_core.errors import InputError
-from cocalib.web.messages import Done, Incoming, OpeningCommand, Outgoing, encode
+from cocalib.web.messages.incoming import Incoming
+from cocalib.web.messages.opening_messages import OpeningCommand
+from cocalib.web.messages.outgoing import Done, Outgoing, encode
 
 
 class Desk(Protocol):

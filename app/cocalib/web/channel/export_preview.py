@@ -5,21 +5,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    CalibrationFile,
-    CheckReport,
-    Export,
-    check,
-    contents_text,
-    export,
-    for_raw,
-    format_named,
-    imported,
-    missing_map,
-    read_any,
-)
-from calib_core.interchange.calibration_file import Evidence
-from cocalib.view import WarningRow, sentence, warning_row
+from calib_core.interchange.calibration_file import CalibrationFile, Evidence
+from calib_core.interchange.check.report import CheckReport, check
+from calib_core.interchange.exporting import Export, contents_text, export
+from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import format_named
+from calib_core.interchange.formats.statement import missing_map
+from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.raw_data import for_raw
+from cocalib.view.model import WarningRow, warning_row
+from cocalib.view.wording import sentence
 from cocalib.web.exports import (
     CheckPointRow,
     Field,

@@ -15,7 +15,7 @@ from calib_core.recordings import FollowedRecording, Recording, TopicSummary, cl
 from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
-from cocalib.view import View, warning_row
+from cocalib.view.model import View, warning_row
 from cocalib.web.channel.boxes import BoxDesk
 from cocalib.web.channel.desk import ClosedDesk, Desk
 from cocalib.web.channel.image_changes import ImageChanges, changes_of
@@ -25,9 +25,8 @@ from cocalib.web.channel.outbox import Outbox, ViewFeed
 from cocalib.web.channel.proposing import ProposingDesk
 from cocalib.web.channel.radar_survey import Survey, survey_of
 from cocalib.web.frames import FrameStore
-from cocalib.web.messages import (
+from cocalib.web.messages.outgoing import (
     Outgoing,
-    Placements,
     Progress,
     RecordingNote,
     SensorNote,
@@ -35,6 +34,7 @@ from cocalib.web.messages import (
     StampColumns,
     encode,
 )
+from cocalib.web.messages.space_messages import Placements
 from cocalib.web.radar_sight import RadarSight
 from cocalib.workspace import Workspace
 

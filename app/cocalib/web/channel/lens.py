@@ -10,29 +10,22 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import camera_info_text
 from calib_core.interchange.cameras.camera_format import HASH_TAG
-from calib_core.intrinsics import (
-    MODEL_ERRORS_UNSEEN,
-    Board,
-    CalibratedLens,
-    Coverage,
-    ImageGrid,
-    LensView,
-    ModelTrial,
-    board_of_size,
-    projection_uncertainty,
-    residual_field,
-)
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.intrinsics.board import Board, board_of_size
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView, ModelTrial
+from calib_core.intrinsics.coverage import Coverage
+from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, ImageGrid, projection_uncertainty, residual_field
 from calib_core.recordings import Recording
 from calib_core.words.intrinsics import residuals_text
 from cocalib.intrinsics import LensJob, LensSnapshot, RecordedImages, field_of_view_text
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
-from cocalib.view import Figure, sentence, warning_row
-from cocalib.view.wording import plain, with_sigma
+from cocalib.session.events import IntrinsicsChosen
+from cocalib.session.state import ChosenIntrinsics
+from cocalib.view.model import Figure, warning_row
+from cocalib.view.wording import plain, sentence, with_sigma
 from cocalib.web.channel.outbox import Outbox
-from cocalib.web.messages import (
+from cocalib.web.messages.lens_messages import (
     LensCalibrate,
     LensCamera,
     LensCancel,
@@ -41,9 +34,8 @@ from cocalib.web.messages import (
     LensTrial,
     LensUse,
     LensViewRow,
-    Outgoing,
-    encode,
 )
+from cocalib.web.messages.outgoing import Outgoing, encode
 from cocalib.workspace import Workspace
 
 _TELL_EVERY_S = 0.2

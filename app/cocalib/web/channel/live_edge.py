@@ -17,9 +17,10 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import FollowedRecording, Growth
 from calib_core.results import Calibration
-from cocalib.view import FollowState, Pace, advice_words, pace_words, sentence
+from cocalib.view.following import FollowState, Pace, advice_words, pace_words
+from cocalib.view.wording import sentence
 from cocalib.web.channel.radar_survey import GrowingSurvey, Survey
-from cocalib.web.messages import FollowNote, FramesAdded, Outgoing, StampColumns
+from cocalib.web.messages.outgoing import FollowNote, FramesAdded, Outgoing, StampColumns
 from cocalib.workspace import Workspace
 
 _LOOK_EVERY_S = 0.2

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeAlias, TypeVar
 
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.view import View
-from cocalib.web.messages import ViewChange, change_between, encode
+from cocalib.view.model import View
+from cocalib.web.messages.outgoing import ViewChange, change_between, encode
 
 Message: TypeAlias = str | bytes | Callable[[], str]
 """What is sent, or a function that writes it when it is sent; "" if there is nothing to send."""

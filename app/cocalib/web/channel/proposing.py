@@ -13,16 +13,16 @@ from calib_core.proposing import DwellView, Proposal
 from calib_core.proposing.dwell_views import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
-from cocalib.view import is_dismissed, sentence
+from cocalib.view.build import is_dismissed
+from cocalib.view.wording import sentence
 from cocalib.web.channel.outbox import Outbox
-from cocalib.web.messages import (
+from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
+from cocalib.web.messages.outgoing import (
     Outgoing,
     ProposalNews,
     ProposalPlace,
     ProposalRow,
-    ProposingSwitch,
     Snapped,
-    SnapWanted,
     UnproposedRow,
     encode,
 )

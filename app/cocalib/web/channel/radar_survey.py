@@ -11,9 +11,9 @@ from calib_core.association.placements import MOST_STATIC_RETURNS, Placement, fi
 from calib_core.measurements import MIN_PAIRS, NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
-from cocalib.view import Figure
+from cocalib.view.model import Figure
 from cocalib.view.wording import plain
-from cocalib.web.messages import PlacementRow, Placements, RadarMap
+from cocalib.web.messages.space_messages import PlacementRow, Placements, RadarMap
 
 _CELLS_ACROSS = 600
 _SMALLEST_CELL_M = 0.2

@@ -11,13 +11,14 @@ from typing import TypeAlias
 from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
-from calib_core.interchange import adopted_calibration
 from calib_core.interchange.hypotheses.reading import read_clear
+from calib_core.interchange.importing import adopted_calibration
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.words import said_of, words
-from cocalib.session import Session
+from calib_core.words.outcomes import said_of
+from calib_core.words.text import words
+from cocalib.session.state import Session
 from cocalib.solving.solving import solve_clicks
 from cocalib.view.contours import contour_maps
 from cocalib.view.review import (
@@ -32,7 +33,6 @@ from cocalib.view.review import (
     solution_of,
 )
 from cocalib.web.channel.outbox import NewestWins, Outbox
-from cocalib.web.messages import Outgoing, Uncertainty, encode
 from cocalib.web.messages.incoming import (
     CompareWanted,
     PairReviewWanted,
@@ -41,6 +41,7 @@ from cocalib.web.messages.incoming import (
     SolutionKind,
     UncertaintyWanted,
 )
+from cocalib.web.messages.outgoing import Outgoing, Uncertainty, encode
 from cocalib.workspace import Workspace
 
 _Work: TypeAlias = Callable[[], Outgoing]

@@ -13,11 +13,12 @@ from calib_core.arrays import Points3
 from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.radar import RadarErrors
-from cocalib.view import shown_calibration
+from cocalib.view.reference import shown_calibration
 from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.frames import Frame
-from cocalib.web.messages import CursorMoved, SpaceLook
+from cocalib.web.messages.incoming import CursorMoved
+from cocalib.web.messages.space_messages import SpaceLook
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of
 from cocalib.web.view3d.returns import Colouring

@@ -12,8 +12,7 @@ from calib_core.json_forms import from_json
 from calib_core.measurements import TimeNs
 from calib_core.parsing import json_form
 from cocalib.option_changes import changes_from_tree
-from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
-from cocalib.session.events import Id
+from cocalib.session.events import AxesStated, ClickPlaced, ColumnsMapped, Id, JournalStep, OptionsChanged
 from cocalib.web.messages.lens_messages import LensCalibrate, LensCancel, LensUse
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 

@@ -6,8 +6,12 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from calib_core.intrinsics import BoardKind, Coverage, ImageGrid, LeftOutImage, ModelTrial
-from cocalib.view import Figure, WarningRow
+from calib_core.intrinsics.board import BoardKind
+from calib_core.intrinsics.board_images import LeftOutImage
+from calib_core.intrinsics.calibrated_lens import ModelTrial
+from calib_core.intrinsics.coverage import Coverage
+from calib_core.intrinsics.image_maps import ImageGrid
+from cocalib.view.model import Figure, WarningRow
 
 LensModelName: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
 Stage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]

@@ -13,9 +13,11 @@ from calib_core.json_forms import to_json
 from calib_core.measurements import NS_PER_S, Stamp
 from cocalib.option_changes import OptionGroup, option_groups
 from cocalib.proposing import ProposingProgress
-from cocalib.view import ClickRow, FollowState, PairCandidates, View, WarningRow
 from cocalib.view.acc_panel import AccPanel
+from cocalib.view.candidates import PairCandidates
 from cocalib.view.contours import ContourMap
+from cocalib.view.following import FollowState
+from cocalib.view.model import ClickRow, View, WarningRow
 from cocalib.view.review import Compared, PairReview, Review
 from cocalib.web.messages.lens_messages import LensResult, LensState
 from cocalib.web.messages.opening_messages import FolderListing, OpeningChoices

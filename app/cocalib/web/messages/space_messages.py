@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from cocalib.view import Figure
+from cocalib.view.model import Figure
 
 PlacementState: TypeAlias = Literal["open", "clicked", "dismissed"]
 

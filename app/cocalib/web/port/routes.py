@@ -15,15 +15,17 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import CalibrationError
-from calib_core.interchange import CalibrationFile, read_calibration, written_formats
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.formats.registry import written_formats
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from calib_core.words import in_sentences
-from cocalib.report import current_report
-from cocalib.session import Session
+from calib_core.words.outcomes import in_sentences
+from cocalib.report.making import current_report
+from cocalib.session.state import Session
 from cocalib.solving.solving import calibration_text
-from cocalib.view import sentence
+from cocalib.view.wording import sentence
 from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
 from cocalib.web.channel.image_changes import ImageChanges
 from cocalib.web.channel.lens import LensDesk

@@ -18,7 +18,8 @@ from cocalib.platform.resources import site_folder, static_folder
 from cocalib.web.channel.channel import Channel, Socket
 from cocalib.web.channel.desk import Desk
 from cocalib.web.channel.hub import Hub
-from cocalib.web.messages import Opening, OpeningChoices
+from cocalib.web.messages.opening_messages import OpeningChoices
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port import guard
 from cocalib.web.port.entrance import Entrance
 from cocalib.web.port.link import Link, ServerOptions

@@ -13,9 +13,10 @@ from typing import Protocol, Self
 
 from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage, Recording
-from cocalib.view import sentence
+from cocalib.view.wording import sentence
 from cocalib.web.channel.desk import Desk
-from cocalib.web.messages import Opening, OpeningChoices
+from cocalib.web.messages.opening_messages import OpeningChoices
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port.link import Link, ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.waiting import WaitingRoom

@@ -10,21 +10,12 @@ from collections import deque
 from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.view import sentence
+from cocalib.view.wording import sentence
 from cocalib.web.channel.channel import Socket
 from cocalib.web.channel.desk import ClosedDesk, Desk, answer_of
-from cocalib.web.messages import (
-    FrameHeader,
-    Opening,
-    OpeningChoices,
-    OpeningCommand,
-    Problem,
-    encode,
-    encode_frame,
-    is_about_opening,
-    parse,
-    request_of,
-)
+from cocalib.web.messages.incoming import is_about_opening, parse, request_of
+from cocalib.web.messages.opening_messages import OpeningChoices, OpeningCommand
+from cocalib.web.messages.outgoing import FrameHeader, Opening, Problem, encode, encode_frame
 
 _log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Points3, Values, Vector3
-from cocalib.web.messages import Viewpoint
+from cocalib.web.messages.incoming import Viewpoint
 
 _MOST = 0.98
 """The extent holds this share of the static returns; the rest may be ghosts or multipath."""

@@ -11,7 +11,8 @@ from cocalib.web.view3d.shapes import add_cloud, fill_cloud
 if TYPE_CHECKING:
     import viser
 from cocalib.colours import RETURN_RAMPS, STAYING, ramp_colours
-from cocalib.web.messages import RadarMap, ReturnColour, SpaceLegend
+from cocalib.web.messages.incoming import ReturnColour
+from cocalib.web.messages.space_messages import RadarMap, SpaceLegend
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.shapes import DARK, LIGHT

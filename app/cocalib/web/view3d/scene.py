@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
-from cocalib.web.messages import Viewpoint
+from cocalib.web.messages.incoming import Viewpoint
 from cocalib.web.view3d.extent import UNKNOWN, Extent, fitted_stand, ring_ranges_m
 from cocalib.web.view3d.returns import SizedClouds, size_classes
 from cocalib.web.view3d.shapes import (
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import viser
 from typing import TYPE_CHECKING
 
-from cocalib.web.messages import PlacementState
+from cocalib.web.messages.space_messages import PlacementState
 from cocalib.web.view3d.returns import map_colours
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, PairResult
-from cocalib.session import Session
-from cocalib.view import Reference, View, shown_calibration
+from cocalib.session.state import Session
+from cocalib.view.model import View
+from cocalib.view.reference import Reference, shown_calibration
 from cocalib.web.frames import Frame
-from cocalib.web.messages import (
+from cocalib.web.messages.space_messages import (
     PlacementState,
     RadarMap,
     SpaceLabel,

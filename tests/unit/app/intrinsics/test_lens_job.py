@@ -9,13 +9,10 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
-from calib_core.intrinsics import (
-    Board,
-    BoardCorners,
-    BoardSearch,
-    CalibratedLens,
-    SearchProgress,
-)
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import BoardCorners
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics import LensJob, LensSnapshot, LensStage
 

@@ -7,8 +7,11 @@ import pytest
 from calib_core.measurements import TimeNs
 from cocalib.opening.choice import Choice
 from cocalib.opening.opened import fitting_clicks, session_folder, session_offer
-from cocalib.session import ClickPlaced, RecordingFacts
-from cocalib.session.file import SessionFileError, has_session_of, open_session_file
+from cocalib.session.events import ClickPlaced
+from cocalib.session.file.finding import has_session_of
+from cocalib.session.file.guarded_folder import SessionFileError
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
 from cocalib.workspace import open_workspace, recording_facts
 from tests.image_recording import ImageRecording, grey_images
 

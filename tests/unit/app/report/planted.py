@@ -7,8 +7,10 @@ import cv2
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
-from calib_core.interchange import compare, imported, read_calibration
+from calib_core.evaluation.figures import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.format import imported
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.making import subject_of

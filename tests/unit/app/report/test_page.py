@@ -9,12 +9,19 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.evaluation import Evaluation
+from calib_core.evaluation.figures import Evaluation
 from calib_core.geometry import quaternion_wxyz_from_matrix
-from calib_core.interchange import AssumptionNote, Provenance, VehicleNote, compare, export, imported, read_any
+from calib_core.interchange.calibration_file import AssumptionNote, Provenance, VehicleNote
+from calib_core.interchange.check.agreement import compare
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import imported
+from calib_core.interchange.importing import read_any
 from calib_core.results import DataWarning
 from calib_core.results.verdict import stated_error
-from cocalib.report import Against, Judged, ReportSubject, known_calibration, limits_met, report_html, subject_of
+from cocalib.report.making import known_calibration, subject_of
+from cocalib.report.page import report_html
+from cocalib.report.sections.acceptance import limits_met
+from cocalib.report.subject import Against, Judged, ReportSubject
 from cocalib.view.wording import plain
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 

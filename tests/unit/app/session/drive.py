@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import TimeNs
-from cocalib.session import ClickPlaced, History, RecordingFacts, Step, advance
-from cocalib.session.file import Restored, SessionFile, SessionFileError, open_session_file
+from cocalib.session.applying import History, advance
+from cocalib.session.events import ClickPlaced, Step
+from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.journal import JOURNAL
+from cocalib.session.file.session_file import Restored, SessionFile, open_session_file
+from cocalib.session.state import RecordingFacts
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cocalib.session import RecordingFacts
-from cocalib.session.file import SessionFileError, find_session_folder, open_session_file
-from cocalib.session.file.finding import FoundFolder
+from cocalib.session.file.finding import FoundFolder, find_session_folder
+from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.journal import COPY, JOURNAL
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
 from tests.unit.app.session.drive import FACTS as DRIVE
 from tests.unit.app.session.drive import START_NS, clicks_in, kept, place, refused
 

@@ -11,31 +11,24 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import CalibrationError, OptionError
 from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
-from cocalib.session import (
-    ChosenIntrinsics,
+from cocalib.session.applying import EventError, History, advance, apply, settled
+from cocalib.session.events import (
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
-    DismissedPlacement,
-    EventError,
-    History,
     IntrinsicsChosen,
     OptionsChanged,
     PlacementDismissed,
-    RecordingFacts,
     Redo,
     ReturnChosen,
-    Session,
     Solved,
     Undo,
     WarningsAcknowledged,
-    advance,
-    apply,
-    settled,
 )
+from cocalib.session.state import ChosenIntrinsics, DismissedPlacement, RecordingFacts, Session
 from tests.unit.app.session.drive import FACTS, START_NS, TIMES, place
 
 NO_ANSWER = Unsolvable.reported("too-few-pairs", "1 of at least 4 pairs", "click more")

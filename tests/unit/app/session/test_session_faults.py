@@ -11,10 +11,12 @@ import pytest
 
 from benchmarks.reliability.sessions import Made, every_bit, every_kill, every_length, made_session
 from calib_core.options import CalibrationOptions
-from cocalib.session import OptionsChanged, advance
-from cocalib.session.file import SessionFileError, inspect_session, open_session_file, repair_session, set_aside
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.applying import advance
+from cocalib.session.events import OptionsChanged
+from cocalib.session.file.contents import inspect_session, repair_session
+from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.journal import COPY, JOURNAL, bytes_of, sealed, taken_apart
+from cocalib.session.file.session_file import open_session_file, set_aside
 from tests.unit.app.session.drive import FACTS, clicks_in, files, keep, kept, lines_of, place, refused, restored
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links, and has no pipes in folders")

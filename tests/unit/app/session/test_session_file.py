@@ -16,33 +16,29 @@ import pytest
 
 from calib_core.measurements import ChosenReturn, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
-from cocalib.session import (
+from cocalib.platform.resources import user_session_folder
+from cocalib.session.applying import History, advance
+from cocalib.session.events import (
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
-    History,
     IntrinsicsChosen,
     OptionsChanged,
     PlacementDismissed,
-    RecordingFacts,
     Redo,
     ReturnChosen,
     Solved,
     Undo,
     WarningsAcknowledged,
-    advance,
 )
-from cocalib.session.file import (
-    SessionFileError,
-    open_session_file,
-    recording_session_folder,
-    set_aside,
-    user_session_folder,
-)
+from cocalib.session.file.finding import recording_session_folder
+from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.journal import COPY, JOURNAL, bytes_of, sealed, taken_apart
+from cocalib.session.file.session_file import open_session_file, set_aside
+from cocalib.session.state import RecordingFacts
 from tests.unit.app.session.drive import (
     FACTS,
     TIMES,
@@ -112,8 +108,8 @@ KILLED = """
 import os, sys
 from pathlib import Path
 from msgspec.structs import replace
-from cocalib.session import advance
-from cocalib.session.file import open_session_file
+from cocalib.session.applying import advance
+from cocalib.session.file.session_file import open_session_file
 from tests.unit.app.session.drive import FACTS, place
 session_file = open_session_file(Path(sys.argv[1]), FACTS)
 history = session_file.restored.history

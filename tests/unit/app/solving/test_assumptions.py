@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from calib_core.interchange import read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
-from cocalib.session import AssumptionsConfirmed, ColumnsMapped
-from cocalib.session.file import remembered_map
+from cocalib.session.events import AssumptionsConfirmed, ColumnsMapped
+from cocalib.session.file.finding import remembered_map
 from cocalib.solving.solving import GivenPairs, calibration_text, calibration_text_of_pairs, solve_pairs
 from cocalib.workspace import Workspace, open_workspace
 from tests.vendor_recording import STATED, vendor_sample

@@ -18,7 +18,7 @@ from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import UnconfirmedClicks
 from calib_core.results.actions import MeasureCameraPosition
 from calib_core.synthetic import simulate_pairs
-from calib_core.words import outcome_told
+from calib_core.words.outcomes import outcome_told
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))

@@ -14,7 +14,9 @@ import pytest
 from calib_core.association.pairing import half_window_s
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
-from calib_core.interchange import CameraFile, camera_info_text, read_calibration
+from calib_core.interchange.cameras.files import CameraFile
+from calib_core.interchange.cameras.ros import camera_info_text
+from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
@@ -23,7 +25,7 @@ from calib_core.results import Calibration, DataWarning
 from calib_core.results.actions import FollowHint
 from calib_core.results.verdict import verdict_on
 from cocalib.platform.resources import version
-from cocalib.session import ClicksImported, OptionsChanged
+from cocalib.session.events import ClicksImported, OptionsChanged
 from cocalib.solving.solving import (
     GivenPairs,
     calibration_text,

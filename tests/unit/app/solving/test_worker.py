@@ -14,7 +14,7 @@ from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from cocalib.session import Solved
+from cocalib.session.events import Solved
 from cocalib.solving.worker import SolverWorker
 from tests.unit.app.solving.test_solving import CLICK, Radar
 

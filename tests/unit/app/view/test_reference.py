@@ -8,15 +8,10 @@ import pytest
 
 from calib_core.association.placements import Placement
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    FORMATS,
-    adopt,
-    export,
-    format_named,
-    read_any,
-    read_calibration,
-    write_calibration,
-)
+from calib_core.interchange.exporting import export
+from calib_core.interchange.formats.registry import FORMATS, format_named
+from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
 from calib_core.measurements import (
     RadarScan,
     RadarScans,
@@ -27,8 +22,10 @@ from calib_core.measurements import (
 from calib_core.radar import RadarErrors
 from cocalib.evaluation.evaluating import check_clicks
 from cocalib.opening.opened import GivenCalibration
-from cocalib.session import History, RecordingFacts, Session
-from cocalib.view import Reference, shown_calibration, view
+from cocalib.session.applying import History
+from cocalib.session.state import RecordingFacts, Session
+from cocalib.view.build import view
+from cocalib.view.reference import Reference, shown_calibration
 from cocalib.web.radar_sight import overlay_of
 
 FEW = Unsolvable.reported("too-few-pairs", "1 of 4 pairs", "click more placements")

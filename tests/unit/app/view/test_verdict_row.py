@@ -11,8 +11,11 @@ from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaire
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
 from calib_core.results.actions import ClickMore, Export, ReduceError
 from calib_core.results.verdict import Assumed, StatedError, Verdict, stated_error, verdict_on
-from calib_core.words import PairPart, error_text
-from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
+from calib_core.words.text import PairPart
+from calib_core.words.verdict import error_text
+from cocalib.session.applying import History, advance
+from cocalib.session.events import ClickPlaced, PlacementDismissed
+from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
 from tests.unit.app.view.test_view import FIVE, calibration, pair, shown

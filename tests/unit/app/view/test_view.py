@@ -14,11 +14,14 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
 from calib_core.synthetic import simulate_pairs
-from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
-from cocalib.view import View, summary_lines, view
+from cocalib.session.applying import History, advance
+from cocalib.session.events import ClickExcluded, ClickMoved, ClickPlaced, Solved, Undo
+from cocalib.session.state import RecordingFacts
+from cocalib.view.build import summary_lines, view
 from cocalib.view.candidates import click_candidates
 from cocalib.view.click_rows import ellipses_of, reprojections
 from cocalib.view.figures import OPTICAL_FROM_BODY, mounting_of, pose_figures
+from cocalib.view.model import View
 from cocalib.view.wording import plain, sentence, with_sigma
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)

@@ -8,7 +8,8 @@ from typing import get_args
 import numpy as np
 
 from calib_core.diagnostics.next_placement import Coverage, Place
-from calib_core.intrinsics import Board, LeftOutImage
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import LeftOutImage
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.actions import (
@@ -29,14 +30,16 @@ from calib_core.results.actions import (
     Stop,
 )
 from calib_core.results.systematic_errors import SystematicErrorResult
-from calib_core.words import in_sentences
-from calib_core.words.outcomes import OUTCOMES
+from calib_core.words.outcomes import OUTCOMES, in_sentences
 from calib_core.words.systematic_errors import ERRORS
 from calib_core.words.unpaired import UNPAIRED
 from calib_core.words.verdict import words_of
 from calib_core.words.warnings import ROWS
-from cocalib.session import ClickExcluded, History
-from cocalib.view import Pace, View, advice_words, pace_words, view
+from cocalib.session.applying import History
+from cocalib.session.events import ClickExcluded
+from cocalib.view.build import view
+from cocalib.view.following import Pace, advice_words, pace_words
+from cocalib.view.model import View
 from tests.unit.app.view.test_view import ASKING, EVERY_STATE, FACTS, FIVE, UNSEEN, calibration, clicked, pair, shown
 
 KEPT = Path(__file__).with_name("words.txt")

@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 from calib_core.camera import Camera
-from calib_core.interchange import (
-    FORMATS,
-    FrameNames,
-    ImportedCalibration,
-    WrittenPose,
-    choose_check_point,
-    export,
-    read_any,
-)
+from calib_core.interchange.calibration_file import FrameNames, choose_check_point
+from calib_core.interchange.exporting import export
+from calib_core.interchange.format import ImportedCalibration, WrittenPose
+from calib_core.interchange.formats.registry import FORMATS
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.results import CheckPoint
 from cocalib.web.channel.export_preview import export_preview, exported

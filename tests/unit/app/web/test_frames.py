@@ -14,7 +14,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.recordings.camera.images import EncodedImage
 from cocalib.web.frames import FrameStore
-from cocalib.web.messages import FrameHeader
+from cocalib.web.messages.outgoing import FrameHeader
 
 
 def decoded(data: bytes) -> np.ndarray:

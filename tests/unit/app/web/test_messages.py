@@ -13,46 +13,48 @@ from hypothesis import strategies as st
 
 from calib_core.errors import CalibrationError, InputError, OptionError
 from calib_core.measurements import Stamp, TimeNs
-from cocalib.session import (
+from cocalib.session.applying import History, advance
+from cocalib.session.events import (
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
-    History,
     OptionsChanged,
-    RecordingFacts,
     Redo,
     Undo,
-    advance,
 )
-from cocalib.view import View, view
-from cocalib.web.messages import (
+from cocalib.session.state import RecordingFacts
+from cocalib.view.build import view
+from cocalib.view.model import View
+from cocalib.web.messages.incoming import (
     MAX_TEXT_BYTES,
     CursorMoved,
-    Done,
-    FrameHeader,
     FrameWanted,
     Hello,
     ImportWanted,
     Incoming,
+    ProposingSwitch,
+    ViewpointWanted,
+    parse,
+    request_of,
+)
+from cocalib.web.messages.outgoing import (
+    Done,
+    FrameHeader,
     Overlay,
     OverlayGuess,
     Problem,
     Progress,
-    ProposingSwitch,
-    RadarReturn,
     RecordingNote,
     SensorNote,
     SessionNote,
     StampColumns,
-    ViewpointWanted,
     change_between,
     encode,
     encode_frame,
-    parse,
-    request_of,
 )
+from cocalib.web.messages.space_messages import RadarReturn
 from cocalib.web.messages.typescript import declarations
 
 

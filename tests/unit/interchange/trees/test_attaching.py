@@ -7,14 +7,11 @@ import pytest
 from pytransform3d.urdf import UrdfTransformManager
 
 from calib_core.errors import InputError
-from calib_core.interchange import (
-    CalibrationFile,
-    FrameNames,
-    attached_export,
-    check,
-    imported,
-    read_any,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.check.report import check
+from calib_core.interchange.exporting import attached_export
+from calib_core.interchange.format import imported
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles

@@ -13,16 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import (
-    CalibrationFile,
-    FrameNames,
-    Patch,
-    WantedFrames,
-    patched,
-    read_any_files,
-    read_calibration,
-    tree_files,
-)
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.importing import read_any_files, tree_files
+from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.trees.frame_choice import WantedFrames
+from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles
 

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from xacro import process_file
 
 from calib_core.errors import InputError
-from calib_core.interchange import WantedFrames, read_any, read_any_files
+from calib_core.interchange.importing import read_any, read_any_files
+from calib_core.interchange.trees.frame_choice import WantedFrames
 from tests.unit.interchange.trees import vehicles
 
 CLOSE = {"rtol": 0, "atol": 1e-9}

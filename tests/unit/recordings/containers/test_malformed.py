@@ -11,7 +11,7 @@ import pytest
 
 from calib_core.errors import RecordingError
 from calib_core.recordings import describe, first_image, inspect_recording
-from calib_core.words import told
+from calib_core.words.warnings import told
 from tests.unit.recordings.containers.malformed import CASES, FRAMES, Kit
 
 LOSSLESS = {

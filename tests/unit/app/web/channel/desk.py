@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from calib_core.camera import Camera
-from cocalib.session import RecordingFacts
-from cocalib.session.file import open_session_file
-from cocalib.web.messages import Outgoing
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
+from cocalib.web.messages.outgoing import Outgoing
 from cocalib.workspace import GivenIntrinsics, Workspace
 
 

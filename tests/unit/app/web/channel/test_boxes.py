@@ -14,7 +14,8 @@ from calib_core.errors import InputError
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from cocalib.view.acc_panel import AccPanel
 from cocalib.web.channel.boxes import BoxDesk
-from cocalib.web.messages import BoxesWanted, MovingBoxesWanted, Outgoing, Progress
+from cocalib.web.messages.incoming import BoxesWanted, MovingBoxesWanted
+from cocalib.web.messages.outgoing import Outgoing, Progress
 from cocalib.workspace import Workspace, open_workspace
 from tests.street_recording import StreetRecording, reference_calibration
 

@@ -12,22 +12,18 @@ import pytest
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import read_camera
-from calib_core.intrinsics import (
-    Board,
-    BoardCorners,
-    BoardSearch,
-    CalibratedLens,
-    LeftOutImage,
-    LensView,
-    ModelTrial,
-    SearchProgress,
-)
+from calib_core.interchange.cameras.files import read_camera
+from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView, ModelTrial
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.results import DataWarning
-from cocalib.session import RecordingFacts
+from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.lens import LensDesk, camera_table, lens_result, view_corners
 from cocalib.web.channel.outbox import Outbox
-from cocalib.web.messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse, Outgoing, encode, parse
+from cocalib.web.messages.incoming import parse
+from cocalib.web.messages.lens_messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse
+from cocalib.web.messages.outgoing import Outgoing, encode
 from cocalib.workspace import Workspace
 from tests.unit.app.web.channel.desk import session_without_solver, visited
 

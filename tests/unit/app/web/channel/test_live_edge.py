@@ -11,11 +11,12 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.recordings import AwaitedRecording, FollowedRecording
-from cocalib.session import ClickPlaced, RecordingFacts
-from cocalib.session.file import open_session_file
+from cocalib.session.events import ClickPlaced
+from cocalib.session.file.session_file import open_session_file
+from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.live_edge import LiveEdge
 from cocalib.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
-from cocalib.web.messages import FollowNote, FramesAdded, Outgoing
+from cocalib.web.messages.outgoing import FollowNote, FramesAdded, Outgoing
 from cocalib.workspace import Workspace
 from tests.growing_recording import SampleWriter
 from tests.unit.app.web.channel.desk import NoSolver

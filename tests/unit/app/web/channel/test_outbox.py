@@ -9,11 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib_core.measurements import Stamp, TimeNs
-from cocalib.session import ClickPlaced, History, RecordingFacts, advance
-from cocalib.view import ClickRow, View, view
-from cocalib.view.model import Ellipse, Figure
+from cocalib.session.applying import History, advance
+from cocalib.session.events import ClickPlaced
+from cocalib.session.state import RecordingFacts
+from cocalib.view.build import view
+from cocalib.view.model import ClickRow, Ellipse, Figure, View
 from cocalib.web.channel.outbox import NewestWins, Shown, ViewFeed
-from cocalib.web.messages import encode
+from cocalib.web.messages.outgoing import encode
 from tests.page_view import applied
 
 

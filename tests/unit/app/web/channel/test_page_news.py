@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.web.channel.outbox import NewestWins, Outbox
 from cocalib.web.channel.radar_survey import placements_at, survey_of
 from cocalib.web.radar_sight import RadarSight, overlay_of

@@ -12,9 +12,11 @@ import pytest
 
 from calib_core.measurements import TimeNs
 from calib_core.proposing import ViewProgress
-from cocalib.session import PlacementDismissed, RecordingFacts
+from cocalib.session.events import PlacementDismissed
+from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.proposing import ProposingDesk
-from cocalib.web.messages import ProposalNews, ProposingSwitch, SnapWanted
+from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
+from cocalib.web.messages.outgoing import ProposalNews
 from cocalib.workspace import Workspace
 from tests.drawn_views import draw_views
 from tests.unit.app.web.channel.desk import session_without_solver, visited

@@ -13,7 +13,7 @@ from cocalib.web.channel.radar_survey import (
     survey_of,
 )
 from cocalib.web.channel.space_feed import surveyed_extent
-from cocalib.web.messages import PlacementRow
+from cocalib.web.messages.space_messages import PlacementRow
 from cocalib.web.radar_sight import RadarSight, Returns, look_of
 
 NAN = float("nan")

@@ -13,7 +13,8 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from cocalib.session import History, Session
+from cocalib.session.applying import History
+from cocalib.session.state import Session
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.channel.review import ReviewDesk
 from cocalib.web.messages.incoming import CompareWanted, ReviewRequest, ReviewWanted, UncertaintyWanted

@@ -13,7 +13,8 @@ from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
 from cocalib.web.channel.channel import snapped
 from cocalib.web.frames import FrameStore
-from cocalib.web.messages import Snapped, SnapWanted, encode, parse
+from cocalib.web.messages.incoming import SnapWanted, parse
+from cocalib.web.messages.outgoing import Snapped, encode
 from tests.unit.proposing.trihedral import draw_look, noisy_image
 
 _RNG = np.random.default_rng(5)

@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.interchange import (
-    FORMATS,
-    choose_check_point,
-    format_named,
-)
+from calib_core.interchange.calibration_file import choose_check_point
+from calib_core.interchange.formats.registry import FORMATS, format_named
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.results import Calibration
-from cocalib.session import Session
+from cocalib.session.state import Session
 from cocalib.web.port.routes import Reply, Routes
 from tests.image_recording import ImageRecording, grey_images
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cocalib.web.messages import Opening
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port import link as module
 from cocalib.web.port.link import HandOver, ServerOptions
 from cocalib.web.port.serving import Service

@@ -19,9 +19,9 @@ from websockets.sync.client import ClientConnection
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from cocalib.cli import run
-from cocalib.session import ClickPlaced
-from cocalib.session.file import inspect_session
-from cocalib.web.messages import Opening
+from cocalib.session.events import ClickPlaced
+from cocalib.session.file.contents import inspect_session
+from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port import serving
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer
@@ -304,7 +304,7 @@ def test_a_signal_while_opening_ends_the_program_quietly(tmp_path, sigint, sent,
 
 SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
 import os, sys, time
-from cocalib.session.file import SessionFile
+from cocalib.session.file.session_file import SessionFile
 close = SessionFile.close
 def close_slowly(session):
     sys.stdout.write("closing\\n")
@@ -360,7 +360,7 @@ def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_int
 PARSES_FOR_EVER = f"""{PRINTS_WHEN_IT_SERVES}
 from calib_core.parsing import yaml_documents
 from cocalib.platform import process
-from cocalib.session.file import SessionFile
+from cocalib.session.file.session_file import SessionFile
 process._GRACE_S = 0.5
 def parse_for_ever(_):
     while True:

@@ -6,7 +6,7 @@ import pytest
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import RadarErrors
-from cocalib.web.messages import RadarMap
+from cocalib.web.messages.space_messages import RadarMap
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.returns import SIZES, Colouring, map_colours, size_classes

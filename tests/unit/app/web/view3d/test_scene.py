@@ -18,10 +18,12 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, Metrics, NextPlacement, PairResult
 from cocalib.colours import residual_colours
-from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
-from cocalib.view import Advice, view
+from cocalib.session.applying import History
+from cocalib.session.state import DismissedPlacement, RecordingFacts, Session
+from cocalib.view.build import view
+from cocalib.view.model import Advice
 from cocalib.web.frames import Frame
-from cocalib.web.messages import FrameHeader
+from cocalib.web.messages.outgoing import FrameHeader
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent
 from cocalib.web.view3d.returns import Colouring
