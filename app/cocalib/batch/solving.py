@@ -16,7 +16,13 @@ from calib_core.results import Calibration
 from calib_core.words.proposing import agreement_text
 from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
-from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
+from cocalib.solving.recorded_clicks import (
+    SPEED_UNIT,
+    about_speed_unit,
+    clicks_in_recording,
+    file_of_clicks,
+    require_confirmed,
+)
 from cocalib.solving.solving import calibration_text, required_camera
 
 CALIBRATION_FILE = "calibration.json"
@@ -82,7 +88,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     Raises:
         CalibrationError: the recording cannot be read, states too little, or the clicks are of another one.
     """
-    require_confirmed(recording)
+    require_confirmed(recording, but=SPEED_UNIT)
     if given.clicks is None and not row.auto:
         return Unsolvable("no-clicks")
     camera = required_camera(recording, given.camera)
@@ -91,6 +97,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     if isinstance(placed, Unsolvable):
         return placed
     outcome = solve_placed_clicks(recording, placed, camera, row.options)
+    notes.extend(about_speed_unit(recording, placed.clicks, camera, row.options, outcome))
     if isinstance(outcome, Unsolvable):
         return outcome
     text = _calibration_text(row, outcome, recording, given, placed)

@@ -155,7 +155,7 @@ class Solve:
 
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from cocalib.solving.automatic import solve_placed_clicks
-        from cocalib.solving.recorded_clicks import require_confirmed
+        from cocalib.solving.recorded_clicks import SPEED_UNIT, about_speed_unit, require_confirmed
         from cocalib.solving.solving import calibration_text, required_camera
 
         self._require_folders()
@@ -163,13 +163,15 @@ class Solve:
         options = self._all_options()
         file = self._clicks_file()
         with self.recorded.open() as recording:
-            require_confirmed(recording)
+            require_confirmed(recording, but=SPEED_UNIT)
             tell_choices(recording)
             camera = required_camera(recording, camera_file)
             placed = self._placed(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
                 return explain_unsolvable(placed)
             outcome = solve_placed_clicks(recording, placed, camera, options)
+            for note in about_speed_unit(recording, placed.clicks, camera, options, outcome):
+                print(f"note: {note}", file=sys.stderr)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
             self._write_clicks(placed, recording)

@@ -1,0 +1,41 @@
+"""Files in the forms that other people's tools write, made of the sample's own returns: their truth is known."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.geometry import RigidTransform
+from calib_core.interchange import read_calibration
+
+pytestmark = pytest.mark.real
+
+
+@pytest.fixture
+def cases(shared_data: Path) -> Path:
+    folder = shared_data / "cases"
+    if not folder.is_dir():
+        pytest.skip("there are no files of other people's tools in ../shared/data/cases")
+    return folder
+
+
+def error_of(out: Path, sample: Path) -> tuple[float, float]:
+    """Return how far a calibration is from the sample's truth [m, deg]."""
+    true = json.loads((sample / "truth.json").read_text())["camera_from_radar"]
+    truth = RigidTransform(np.array(true["rotation"]), np.array(true["translation_m"]))
+    error = read_calibration(out.read_text()).calibration.camera_from_radar.error_from(truth)
+    return float(np.linalg.norm(error[:3])), float(np.degrees(np.linalg.norm(error[3:])))
+
+
+def test_a_unit_of_the_speed_that_cannot_change_the_pose_is_a_note(cocalib, cases, sample, tmp_path):
+    out = tmp_path / "c.json"
+    paths = (cases / "07-speed-unit-unstated" / "radar", sample / "camera.bag")
+    answer = cocalib("solve", *paths, "--clicks", sample / "clicks.json", "--out", out)
+    assert answer.code == 0, answer.err
+    assert "--confirm-assumptions" not in answer.err
+    assert "rangerate" in answer.err
+    assert [one["confirmed"] for one in json.loads(out.read_text())["provenance"]["assumptions"]] == [False]
+    distance_m, turn_deg = error_of(out, sample)
+    assert distance_m < 0.15
+    assert turn_deg < 1.5
