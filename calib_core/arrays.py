@@ -1,4 +1,4 @@
-"""Array types named by their shape, and `frozen_array`, through which every array enters a dataclass."""
+"""Array types named by their shape, and `freeze`, through which every array enters a dataclass."""
 
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -48,6 +48,18 @@ def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.
         raise ValueError(f"expected an array of {wanted}, got {' x '.join(map(str, array.shape)) or 'a single number'}")
     array.setflags(write=False)
     return array
+
+
+def freeze(value: object, dtype: Any = np.float64, /, **shapes: tuple[int | None, ...]) -> None:
+    """Make fields of a frozen dataclass read-only arrays of the given shapes, in its `__post_init__`.
+
+    Args:
+        value: the dataclass, changed in place.
+        dtype: the element type of all of them.
+        shapes: by the fields' names, as in `frozen_array`.
+    """
+    for name, shape in shapes.items():
+        object.__setattr__(value, name, frozen_array(getattr(value, name), shape, dtype=dtype))
 
 
 def _fits(have: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:

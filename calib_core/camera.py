@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Matrix33, Points2, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Matrix33, Points2, Points3, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.lens_models.lens_model import LensModel
 from calib_core.lens_models.registry import LENS_MODELS
@@ -39,7 +39,7 @@ class CameraCovariance:
     def __post_init__(self) -> None:
         count = len(self.order)
         object.__setattr__(self, "order", tuple(self.order))
-        object.__setattr__(self, "matrix", frozen_array(self.matrix, (count, count)))
+        freeze(self, matrix=(count, count))
         if len(set(self.order)) != count:
             raise ValueError("the covariance of the intrinsics names a parameter twice")
         spread = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
@@ -86,8 +86,7 @@ class Camera:
     covariance: CameraCovariance | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix_px", frozen_array(self.matrix_px, (3, 3)))
-        object.__setattr__(self, "distortion", frozen_array(self.distortion, (None,)))
+        freeze(self, matrix_px=(3, 3), distortion=(None,))
         if self.model not in LENS_MODELS:
             raise ValueError(f"unknown camera model '{self.model}'; known: {', '.join(LENS_MODELS)}")
         if len(self.distortion) not in self.lens.counts:

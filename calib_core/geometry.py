@@ -6,7 +6,7 @@ from typing import overload
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Matrix66, Points3, Values, Vector3, freeze, frozen_array
 
 OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), (3, 3))
 """Rotation from body axes (x forward, y left, z up) to a camera's optical axes (x right, y down, z forward)."""
@@ -157,8 +157,7 @@ class RigidTransform:
     translation_m: Vector3
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
-        object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
+        freeze(self, rotation=(3, 3), translation_m=(3,))
         x, y, z = self.rotation.tolist()
         if not all(map(math.isfinite, (*x, *y, *z, *self.translation_m.tolist()))):
             raise ValueError("a transform must be finite")
@@ -274,7 +273,7 @@ class PoseDifference:
     squared: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "error", frozen_array(self.error, (6,)))
+        freeze(self, error=(6,))
 
 
 def pose_difference(first: RigidTransform, second: RigidTransform, covariance: Matrix66) -> PoseDifference:

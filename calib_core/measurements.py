@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, freeze, frozen_array
 from calib_core.errors import UnsolvableError, in_words
 from calib_core.json_forms import Name, Position
 
@@ -132,13 +132,7 @@ class RadarScan:
 
     def __post_init__(self) -> None:
         n = len(self.points_radar_m)
-        for name, shape in (
-            ("points_radar_m", (n, 3)),
-            ("doppler_mps", (n,)),
-            ("snr_db", (n,)),
-            ("sigma_polar", (n, 3)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        freeze(self, points_radar_m=(n, 3), doppler_mps=(n,), snr_db=(n,), sigma_polar=(n, 3))
         object.__setattr__(self, "alternative_of", _frozen_alternatives(self.alternative_of, n))
 
     def __len__(self) -> int:
@@ -177,15 +171,8 @@ class RadarScans:
 
     def __post_init__(self) -> None:
         n, m = len(self.points_radar_m), len(self.times_ns)
-        for name, shape in (
-            ("points_radar_m", (n, 3)),
-            ("doppler_mps", (n,)),
-            ("snr_db", (n,)),
-            ("sigma_polar", (n, 3)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
-        for name, shape in (("times_ns", (m,)), ("first_return", (m + 1,))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, dtype=np.int64))
+        freeze(self, points_radar_m=(n, 3), doppler_mps=(n,), snr_db=(n,), sigma_polar=(n, 3))
+        freeze(self, np.int64, times_ns=(m,), first_return=(m + 1,))
         object.__setattr__(self, "alternative_of", _frozen_alternatives(self.alternative_of, n))
         if np.any(np.diff(self.times_ns) < 0):
             raise ValueError("scans must be in ascending order of time")
@@ -319,9 +306,7 @@ class Candidate:
     alternative_of: int = -1
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
-        object.__setattr__(self, "sigma_polar", frozen_array(self.sigma_polar, (3,)))
-        object.__setattr__(self, "covariance_m2", frozen_array(self.covariance_m2, (3, 3)))
+        freeze(self, position_radar_m=(3,), sigma_polar=(3,), covariance_m2=(3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -351,7 +336,7 @@ class Pair:
     set_aside: tuple[Candidate, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, pixel_px=(2,))
         if not self.candidates:
             raise ValueError(f"pair {self.id} has no radar position")
 

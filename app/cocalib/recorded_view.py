@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, TimesNs, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points2, TimesNs, Values, freeze
 from calib_core.errors import InputError
 from calib_core.evaluation.figures import Evaluation
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReflectorClick, TimeNs
@@ -40,7 +40,7 @@ class SeenReturns:
     pixels_px: Points2
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (len(self.scans.points_radar_m), 2)))
+        freeze(self, pixels_px=(len(self.scans.points_radar_m), 2))
 
     @property
     def seen(self) -> Flags:

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Points3, Values, Vector3, freeze
 from calib_core.association.alternatives import cluster_alternatives, first_rows, return_keys
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
@@ -70,8 +70,7 @@ class Cluster:
     listed_first: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("centre", "scatter", "message_sigma"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
+        freeze(self, centre=(3,), scatter=(3,), message_sigma=(3,))
 
 
 def window_around(scans: RadarScans, time: TimeNs, *, window_s: float) -> RadarScans:

@@ -18,7 +18,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, Values, Vector3, freeze
 from calib_core.association.alternatives import alternative_rows
 from calib_core.association.clustering import (
     CLUSTER_SCALE,
@@ -337,8 +337,7 @@ class Companion:
     far: Indices
 
     def __post_init__(self) -> None:
-        for name in ("near", "far"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.near),), dtype=np.int64))
+        freeze(self, np.int64, near=(len(self.near),), far=(len(self.near),))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, freeze
 from calib_core.association.alternatives import first_rows, return_keys
 from calib_core.association.clustering import CLUSTER_SCALE, cluster_scale
 from calib_core.association.gating import static_returns
@@ -102,7 +102,7 @@ class Placement:
     snr_db: float = float("nan")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
+        freeze(self, position_radar_m=(3,))
 
 
 def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float = 2.0) -> tuple[Placement, ...]:

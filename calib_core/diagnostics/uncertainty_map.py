@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Values, frozen_array
+from calib_core.arrays import Values, freeze
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.geometry import RigidTransform, larger_eigenvalues
@@ -37,10 +37,9 @@ class UncertaintyMap:
     semi_major_px: np.ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns_px", frozen_array(self.columns_px, (None,)))
-        object.__setattr__(self, "rows_px", frozen_array(self.rows_px, (None,)))
+        freeze(self, columns_px=(None,), rows_px=(None,))
         shape = (len(self.rows_px), len(self.columns_px))
-        object.__setattr__(self, "semi_major_px", frozen_array(self.semi_major_px, shape))
+        freeze(self, semi_major_px=shape)
 
 
 def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int = 49) -> UncertaintyMap:

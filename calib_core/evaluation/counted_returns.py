@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, freeze
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.evaluation.moving_returns import TargetOptions
@@ -49,11 +49,9 @@ class Sightings:
     points_radar_m: Points3
 
     def __post_init__(self) -> None:
-        for name in ("frames", "targets", "of_return"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
-        for name in ("azimuth_rad", "range_m"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.frames),)))
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (len(self.of_return), 3)))
+        freeze(self, np.int64, frames=(None,), targets=(None,), of_return=(None,))
+        count = len(self.frames)
+        freeze(self, azimuth_rad=(count,), range_m=(count,), points_radar_m=(len(self.of_return), 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +95,8 @@ class BoxTable:
 
     def __post_init__(self) -> None:
         count = len(self.labels)
-        object.__setattr__(self, "times_ns", frozen_array(self.times_ns, (None,), dtype=np.int64))
-        object.__setattr__(self, "boxes_px", frozen_array(self.boxes_px, (count, 4)))
-        object.__setattr__(self, "cuboids", frozen_array(self.cuboids, (count, 5)))
-        for name in ("frames", "tracks"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), dtype=np.int64))
+        freeze(self, np.int64, times_ns=(None,), frames=(count,), tracks=(count,))
+        freeze(self, boxes_px=(count, 4), cuboids=(count, 5))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,8 +114,8 @@ class Matches:
     bearings: Bearings | None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "boxes", frozen_array(self.boxes, (None,), dtype=np.int64))
-        object.__setattr__(self, "counts", frozen_array(self.counts, (len(self.boxes),), dtype=np.bool_))
+        freeze(self, np.int64, boxes=(None,))
+        freeze(self, np.bool_, counts=(len(self.boxes),))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,11 +156,8 @@ class CountedReturns:
 
     def __post_init__(self) -> None:
         n, count = len(self.labels), len(self.image_times)
-        for name in ("image_times", "radar_times", "box_counts"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), dtype=np.int64))
-        object.__setattr__(self, "frames", frozen_array(self.frames, (n,), dtype=np.int64))
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (n, 3)))
-        object.__setattr__(self, "boxes_px", frozen_array(self.boxes_px, (n, 4)))
+        freeze(self, np.int64, image_times=(count,), radar_times=(count,), box_counts=(count,), frames=(n,))
+        freeze(self, points_radar_m=(n, 3), boxes_px=(n, 4))
 
 
 def counted_returns(

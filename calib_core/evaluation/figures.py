@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values, freeze
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import DataWarning, Metrics
 
@@ -127,10 +127,9 @@ class BoxedReturns:
 
     def __post_init__(self) -> None:
         n = len(self.targets)
-        object.__setattr__(self, "frames", frozen_array(self.frames, (n,), dtype=np.int64))
-        object.__setattr__(self, "inside", frozen_array(self.inside, (n,), dtype=np.bool_))
-        for name, width in (("points_radar_m", 3), ("pixels_px", 2), ("boxes_px", 4)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (n, width)))
+        freeze(self, np.int64, frames=(n,))
+        freeze(self, np.bool_, inside=(n,))
+        freeze(self, points_radar_m=(n, 3), pixels_px=(n, 2), boxes_px=(n, 4))
 
 
 @dataclass(frozen=True, slots=True)

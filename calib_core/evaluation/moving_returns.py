@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, Values, Vector2, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, Values, Vector2, freeze
 from calib_core.measurements import RadarScans
 from calib_core.options import option
 from calib_core.results import DataWarning
@@ -66,8 +66,8 @@ class MovingReturns:
     warnings: tuple[DataWarning, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rows", frozen_array(self.rows, (None,), dtype=np.int64))
-        object.__setattr__(self, "speeds_mps", frozen_array(self.speeds_mps, (len(self.rows),)))
+        freeze(self, np.int64, rows=(None,))
+        freeze(self, speeds_mps=(len(self.rows),))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,8 +202,7 @@ class EgoVelocity:
     speeds_mps: Values
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "velocity_mps", frozen_array(self.velocity_mps, (2,)))
-        object.__setattr__(self, "speeds_mps", frozen_array(self.speeds_mps, (None,)))
+        freeze(self, velocity_mps=(2,), speeds_mps=(None,))
 
 
 def ego_velocity(points_radar_m: Points3, doppler_mps: Values, *, tolerance_mps: float) -> EgoVelocity | None:

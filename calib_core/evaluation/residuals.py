@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Values, freeze
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.camera import Camera
@@ -54,7 +54,7 @@ class AssociatedPairs:
     rule: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "placements", frozen_array(self.placements, (len(self.pairs),), dtype=np.int64))
+        freeze(self, np.int64, placements=(len(self.pairs),))
 
 
 def associated_pairs(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions) -> AssociatedPairs:
@@ -236,9 +236,8 @@ class ResidualTest:
     p_value: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "distances_px", frozen_array(self.distances_px, (None,)))
-        object.__setattr__(self, "outside", frozen_array(self.outside, (None,), dtype=np.bool_))
-        object.__setattr__(self, "misfits", frozen_array(self.misfits, (None,), dtype=np.bool_))
+        freeze(self, distances_px=(None,))
+        freeze(self, np.bool_, outside=(None,), misfits=(None,))
 
 
 def residual_test(pairs: Sequence[Pair], calibration: Calibration) -> ResidualTest:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.arrays import Indices, Points3, TimesNs, Values, frozen_array
+from calib_core.arrays import Indices, Points3, TimesNs, Values, freeze
 from calib_core.errors import InputError
 from calib_core.evaluation.moving_returns import MovingReturns, TargetOptions, moving_returns
 from calib_core.measurements import NS_PER_S, RadarScans
@@ -41,11 +41,8 @@ class TargetClusters:
 
     def __post_init__(self) -> None:
         count = len(self.scans)
-        for name in ("scans", "of_return"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
-        object.__setattr__(self, "positions_m", frozen_array(self.positions_m, (count, 3)))
-        object.__setattr__(self, "covariances_m2", frozen_array(self.covariances_m2, (count, 2, 2)))
-        object.__setattr__(self, "doppler_mps", frozen_array(self.doppler_mps, (count,)))
+        freeze(self, np.int64, scans=(None,), of_return=(None,))
+        freeze(self, positions_m=(count, 3), covariances_m2=(count, 2, 2), doppler_mps=(count,))
 
 
 def target_clusters(scans: RadarScans, options: TargetOptions) -> TargetClusters:
@@ -147,10 +144,8 @@ class TargetTrack:
 
     def __post_init__(self) -> None:
         sightings, returns = len(self.scans), len(self.rows)
-        for name, count in (("times_ns", sightings), ("scans", sightings), ("rows", returns), ("scan_of_row", returns)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), dtype=np.int64))
-        object.__setattr__(self, "positions_m", frozen_array(self.positions_m, (sightings, 3)))
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (returns, 3)))
+        freeze(self, np.int64, times_ns=(sightings,), scans=(sightings,), rows=(returns,), scan_of_row=(returns,))
+        freeze(self, positions_m=(sightings, 3), points_radar_m=(returns, 3))
 
 
 _GATE = 14.156413609126675  # the 99.73 % quantile of chi2 with 3 degrees of freedom

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Matrix66, Values, Vector2, Vector3, freeze, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
@@ -53,8 +53,7 @@ class WrittenPose:
 
     def __post_init__(self) -> None:
         shape = {"matrix": (3, 3), "rpy": (3,)}.get(self.form, (4,))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, shape))
-        object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
+        freeze(self, rotation=shape, translation_m=(3,))
         _refuse_too_large(self.rotation, self.translation_m)
 
     def rotation_matrix(self) -> np.ndarray:
@@ -114,7 +113,7 @@ class StatedCheckPoint:
     rectified_px: Vector2 | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radar_m", frozen_array(self.radar_m, (3,)))
+        freeze(self, radar_m=(3,))
         for name, length in (("camera_m", 3), ("pixel_px", 2), ("rectified_px", 2)):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen_array(getattr(self, name), (length,)))

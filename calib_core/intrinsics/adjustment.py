@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Values, frozen_array
+from calib_core.arrays import Values, freeze
 from calib_core.camera import Camera
 from calib_core.intrinsics.linearization import Freedom, LensState, Linearized, ViewStack, linearize, residuals_of
 from calib_core.lens_models.registry import LENS_MODELS
@@ -296,8 +296,7 @@ class SharedCovariance:
     freedom: Values
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", frozen_array(self.matrix, (None, None)))
-        object.__setattr__(self, "freedom", frozen_array(self.freedom, (None,)))
+        freeze(self, matrix=(None, None), freedom=(None,))
 
     def chances(self, values: Values, first: int = 0) -> Values:
         """Return how likely values as far from zero are, if the truth is zero: (n,).

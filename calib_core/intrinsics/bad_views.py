@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Values, frozen_array
+from calib_core.arrays import Flags, Values, freeze
 from calib_core.camera import Camera
 from calib_core.intrinsics.adjustment import adjust, adjust_robustly, pose_views, typical_sigma
 from calib_core.intrinsics.board_images import BoardCorners
@@ -44,7 +44,7 @@ class JudgedViews:
     reasons: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "kept", frozen_array(self.kept, (len(self.reasons),), dtype=bool))
+        freeze(self, bool, kept=(len(self.reasons),))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

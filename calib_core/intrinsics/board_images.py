@@ -6,7 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 from msgspec import Meta, Struct
 
-from calib_core.arrays import Indices, Points2, frozen_array
+from calib_core.arrays import Indices, Points2, freeze
 from calib_core.json_forms import Name
 from calib_core.measurements import TimeNs
 
@@ -59,8 +59,8 @@ class BoardCorners:
 
     def __post_init__(self) -> None:
         count = len(self.corner_ids)
-        object.__setattr__(self, "corner_ids", frozen_array(self.corner_ids, (count,), dtype=np.int64))
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (count, 2)))
+        freeze(self, np.int64, corner_ids=(count,))
+        freeze(self, pixels_px=(count, 2))
 
 
 class LeftOutImage(Struct, frozen=True, forbid_unknown_fields=True):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Values, frozen_array
+from calib_core.arrays import Values, freeze
 from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
 from calib_core.intrinsics.linearization import BoardWarp, Freedom, LensState, ViewStack, linearize, warped
 from calib_core.intrinsics.model_choice import LensFit
@@ -32,8 +32,7 @@ class ShapeTest:
     lens_change: Values
 
     def __post_init__(self) -> None:
-        for name in ("amounts", "sigmas", "lens_change"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,)))
+        freeze(self, amounts=(None,), sigmas=(None,), lens_change=(None,))
 
 
 def try_shapes(fit: LensFit, stack: ViewStack, warps: BoardWarp) -> ShapeTest:
@@ -76,7 +75,7 @@ class RowSkew:
     other_share: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "skews_px", frozen_array(self.skews_px, (None,)))
+        freeze(self, skews_px=(None,))
 
     @property
     def shows(self) -> bool:

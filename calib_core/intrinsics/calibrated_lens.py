@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from calib_core.arrays import Flags, Points2, Points3, frozen_array
+from calib_core.arrays import Flags, Points2, Points3, freeze
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics.board import Board
@@ -32,8 +32,8 @@ class LensView:
 
     def __post_init__(self) -> None:
         count = len(self.corners.corner_ids)
-        object.__setattr__(self, "residuals_px", frozen_array(self.residuals_px, (count, 2)))
-        object.__setattr__(self, "used", frozen_array(self.used, (count,), dtype=bool))
+        freeze(self, residuals_px=(count, 2))
+        freeze(self, bool, used=(count,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,4 +86,4 @@ class CalibratedLens:
     warnings: tuple[DataWarning, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "board_shape_m", frozen_array(self.board_shape_m, (None, 3)))
+        freeze(self, board_shape_m=(None, 3))

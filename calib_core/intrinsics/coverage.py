@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Counts, Vector3, frozen_array
+from calib_core.arrays import Counts, Vector3, freeze
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 
@@ -50,7 +50,7 @@ class Coverage:
     missing: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "counts", frozen_array(self.counts, (None, None), dtype=np.int64))
+        freeze(self, np.int64, counts=(None, None))
 
 
 def view_coverage(views: Sequence[BoardCorners], board: Board, size_px: tuple[int, int]) -> Coverage:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Grid, Points2, Values, frozen_array
+from calib_core.arrays import Grid, Points2, Values, freeze
 from calib_core.camera import Camera
 from calib_core.geometry import larger_eigenvalues, rotation_jacobian
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
@@ -43,16 +43,10 @@ class ResidualField:
     neighbour_correlation: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, shape in (
-            ("pixels_px", (None, 2)),
-            ("residuals_px", (None, 2)),
-            ("x_px", (None,)),
-            ("y_px", (None,)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
-        object.__setattr__(self, "means_px", frozen_array(self.means_px, (len(self.y_px), len(self.x_px), 2)))
-        object.__setattr__(self, "errors_px", frozen_array(self.errors_px, (len(self.y_px), len(self.x_px))))
-        object.__setattr__(self, "counts", frozen_array(self.counts, (len(self.y_px), len(self.x_px)), dtype=np.int64))
+        grid = (len(self.y_px), len(self.x_px))
+        freeze(self, pixels_px=(None, 2), residuals_px=(None, 2), x_px=(None,), y_px=(None,))
+        freeze(self, means_px=(*grid, 2), errors_px=grid)
+        freeze(self, np.int64, counts=grid)
 
     @property
     def neighbours_alike(self) -> bool:
@@ -152,9 +146,7 @@ class ImageGrid:
     sigma_px: Grid
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x_px", frozen_array(self.x_px, (None,)))
-        object.__setattr__(self, "y_px", frozen_array(self.y_px, (None,)))
-        object.__setattr__(self, "sigma_px", frozen_array(self.sigma_px, (len(self.y_px), len(self.x_px))))
+        freeze(self, x_px=(None,), y_px=(None,), sigma_px=(len(self.y_px), len(self.x_px)))
 
 
 def projection_uncertainty(

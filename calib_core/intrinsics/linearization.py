@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Points3, Values, freeze, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
 from calib_core.intrinsics.board_images import BoardCorners
@@ -28,7 +28,7 @@ class BoardWarp:
     directions: np.ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "directions", frozen_array(self.directions, (len(self.names), None, 3)))
+        freeze(self, directions=(len(self.names), None, 3))
 
     def __len__(self) -> int:
         return len(self.names)
@@ -84,10 +84,8 @@ class ViewStack:
     size_px: tuple[int, int]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "board_m", frozen_array(self.board_m, (None, 3, None)))
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2, None)))
-        object.__setattr__(self, "corner_ids", frozen_array(self.corner_ids, (None, None), dtype=np.int64))
-        object.__setattr__(self, "weights", frozen_array(self.weights, (None, None)))
+        freeze(self, board_m=(None, 3, None), pixels_px=(None, 2, None), weights=(None, None))
+        freeze(self, np.int64, corner_ids=(None, None))
 
     def __len__(self) -> int:
         return len(self.weights)
@@ -164,9 +162,7 @@ class LensState:
     amounts: Values = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotations", frozen_array(self.rotations, (None, 3, 3)))
-        object.__setattr__(self, "translations_m", frozen_array(self.translations_m, (len(self.rotations), 3)))
-        object.__setattr__(self, "amounts", frozen_array(self.amounts, (None,)))
+        freeze(self, rotations=(None, 3, 3), translations_m=(len(self.rotations), 3), amounts=(None,))
 
     def of(self, views: np.ndarray) -> "LensState":
         """Return the state of some of the views, given by numbers or flags (v,)."""
@@ -201,7 +197,7 @@ class Freedom:
     pull: Values = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "lens", frozen_array(self.lens, (None, None)))
+        freeze(self, lens=(None, None))
         pull = self.pull if len(self.pull) else np.zeros(len(self.lens))
         object.__setattr__(self, "pull", frozen_array(pull, (len(self.lens),)))
 

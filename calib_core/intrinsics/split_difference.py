@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, Values, frozen_array
+from calib_core.arrays import Flags, Points2, Values, freeze
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
 from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
@@ -40,10 +40,8 @@ class SplitDifference:
     ratio: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x_px", frozen_array(self.x_px, (None,)))
-        object.__setattr__(self, "y_px", frozen_array(self.y_px, (None,)))
-        for name in ("apart_px", "expected_px"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.y_px), len(self.x_px))))
+        grid = (len(self.y_px), len(self.x_px))
+        freeze(self, x_px=(None,), y_px=(None,), apart_px=grid, expected_px=grid)
 
     @property
     def agrees(self) -> bool:

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Matrix22, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix22, Values, Vector2, Vector3, freeze
 
 _PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
 """How much the image is reduced, and the radius of the disc there [px]."""
@@ -66,8 +66,7 @@ class SectorFit:
     covariance_px2: Matrix22
 
     def __post_init__(self) -> None:
-        for name, shape in (("apex_px", (2,)), ("starts_rad", (3,)), ("covariance_px2", (2, 2))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        freeze(self, apex_px=(2,), starts_rad=(3,), covariance_px2=(2, 2))
 
     @property
     def widths_rad(self) -> Values:
@@ -97,8 +96,7 @@ class Apex:
     radius_px: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-        object.__setattr__(self, "covariance_px2", frozen_array(self.covariance_px2, (2, 2)))
+        freeze(self, pixel_px=(2,), covariance_px2=(2, 2))
 
     @property
     def sigma_px(self) -> float:

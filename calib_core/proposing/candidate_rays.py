@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values, freeze
 from calib_core.camera import Camera
 from calib_core.estimation.measurement_model import OWN_SIGMA_RAD, is_flat
 from calib_core.measurements import ReflectorClick
@@ -74,20 +74,20 @@ class CandidateRays:
 
     def __post_init__(self) -> None:
         n, k = self.odds.shape
-        for name, shape in (
-            ("positions_radar_m", (n, 3)),
-            ("polar", (n, 3)),
-            ("slopes", (n, 3, 3)),
-            ("sigma_polar", (n, 3)),
-            ("rays", (n, k, 3)),
-            ("tangents", (n, k, 2, 3)),
-            ("sigma_rad", (n, k)),
-            ("odds", (n, k)),
-            ("missing", (n,)),
-            ("density", (n, k)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
-        object.__setattr__(self, "click", frozen_array(self.click, (n, k), dtype=np.int64))
+        freeze(
+            self,
+            positions_radar_m=(n, 3),
+            polar=(n, 3),
+            slopes=(n, 3, 3),
+            sigma_polar=(n, 3),
+            rays=(n, k, 3),
+            tangents=(n, k, 2, 3),
+            sigma_rad=(n, k),
+            odds=(n, k),
+            missing=(n,),
+            density=(n, k),
+        )
+        freeze(self, np.int64, click=(n, k))
 
     def __len__(self) -> int:
         return len(self.missing)

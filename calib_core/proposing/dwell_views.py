@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from calib_core.arrays import Indices, Values, Vector2, frozen_array
+from calib_core.arrays import Indices, Values, Vector2, freeze
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
@@ -66,8 +66,7 @@ class DwellView:
     change_without: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", frozen_array(self.frames, (None,), dtype=np.int64))
-        object.__setattr__(self, "clear", frozen_array(self.clear, (None,), dtype=np.int64))
+        freeze(self, np.int64, frames=(None,), clear=(None,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -406,7 +405,7 @@ class DwellAverage:
     frames: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, pixel_px=(2,))
 
 
 def averaged_over_dwell(view: DwellView, frames: FrameSource, clicked: int, pixel_px: Vector2) -> DwellAverage | None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Vector2, frozen_array
+from calib_core.arrays import Vector2, freeze
 
 _MOST = 12
 _APART = 0.8
@@ -26,7 +26,7 @@ class Surroundings:
     corner_px: Vector2
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "corner_px", frozen_array(self.corner_px, (2,)))
+        freeze(self, corner_px=(2,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class ImageCandidate:
     surroundings: Surroundings | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, pixel_px=(2,))
 
 
 def blobs(response: np.ndarray, width_px: float, *, most: int = _MOST) -> tuple[ImageCandidate, ...]:

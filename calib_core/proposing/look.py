@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Vector2, frozen_array
+from calib_core.arrays import Vector2, freeze
 from calib_core.camera import Camera
 from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.apex_refinement import full_image
@@ -60,7 +60,7 @@ class Look:
     larger: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "offset_px", frozen_array(self.offset_px, (2,)))
+        freeze(self, offset_px=(2,))
 
 
 def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | None:

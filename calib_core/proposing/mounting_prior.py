@@ -4,7 +4,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Values, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Values, Vector3, freeze
 from calib_core.geometry import mounting_rotation
 from calib_core.options import CalibrationOptions
 
@@ -38,14 +38,7 @@ class MountingPrior:
     scale_sigma: Values
 
     def __post_init__(self) -> None:
-        for name, shape in (
-            ("rotation", (3, 3)),
-            ("centre_radar_m", (3,)),
-            ("centre_sigma_m", (3,)),
-            ("starts_m", (None, 3)),
-            ("scale_sigma", (2,)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        freeze(self, rotation=(3, 3), centre_radar_m=(3,), centre_sigma_m=(3,), starts_m=(None, 3), scale_sigma=(2,))
 
 
 def mounting_prior(options: CalibrationOptions, *, is_flat: bool) -> MountingPrior:

@@ -22,7 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points2, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.proposing.candidate_rays import CandidateRays
 from calib_core.proposing.dwell_views import DwellView
@@ -55,14 +55,7 @@ class RoughPoses:
 
     def __post_init__(self) -> None:
         m = len(self.scores)
-        for name, shape in (
-            ("rotations", (m, 3, 3)),
-            ("centres_radar_m", (m, 3)),
-            ("scales", (m, 2)),
-            ("noise", (m,)),
-            ("scores", (m,)),
-        ):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        freeze(self, rotations=(m, 3, 3), centres_radar_m=(m, 3), scales=(m, 2), noise=(m,), scores=(m,))
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -132,8 +125,7 @@ class PoseAgreement:
     trials: int
 
     def __post_init__(self) -> None:
-        for name in ("probability", "rival_probability", "off_sigma"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None, None)))
+        freeze(self, probability=(None, None), rival_probability=(None, None), off_sigma=(None, None))
 
     @property
     def likeliest(self) -> Indices:

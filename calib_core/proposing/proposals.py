@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Vector2, frozen_array
+from calib_core.arrays import Vector2, freeze
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
@@ -48,7 +48,7 @@ class Proposal:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, pixel_px=(2,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

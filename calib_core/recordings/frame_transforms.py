@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calib_core.arrays import Vector3, frozen_array
+from calib_core.arrays import Vector3, freeze
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.messages.decoding import Message
@@ -39,8 +39,7 @@ class FrameTransform:
     moves: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
-        object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, (4,)))
+        freeze(self, translation_m=(3,), quaternion_xyzw=(4,))
 
 
 def frame_transforms(paths: Sequence[Path]) -> tuple[FrameTransform, ...]:

@@ -6,7 +6,7 @@ from typing import Self
 import msgspec
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, freeze, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError, in_words
 from calib_core.geometry import RigidTransform
@@ -42,8 +42,7 @@ class CovarianceParts:
     camera_position: Matrix66
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "systematic", frozen_array(self.systematic, (6, 6)))
-        object.__setattr__(self, "camera_position", frozen_array(self.camera_position, (6, 6)))
+        freeze(self, systematic=(6, 6), camera_position=(6, 6))
 
     def within(self, covariance: Matrix66) -> "CovarianceParts":
         """Return the parts, made smaller by one factor if together they exceed a covariance (6, 6) along any axis.
@@ -152,10 +151,7 @@ class PairResult:
     rival: int = -1
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-        object.__setattr__(self, "projected_px", frozen_array(self.projected_px, (2,)))
-        object.__setattr__(self, "point_radar_m", frozen_array(self.point_radar_m, (3,)))
-        object.__setattr__(self, "expected_covariance_px2", frozen_array(self.expected_covariance_px2, (2, 2)))
+        freeze(self, pixel_px=(2,), projected_px=(2,), point_radar_m=(3,), expected_covariance_px2=(2, 2))
 
     @property
     def residual_px(self) -> Vector2:
@@ -176,8 +172,7 @@ class CheckPoint:
     pixel_px: Vector2
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radar_m", frozen_array(self.radar_m, (3,)))
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, radar_m=(3,), pixel_px=(2,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,8 +192,7 @@ class NextPlacement:
     may_stop: bool
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, position_radar_m=(3,), pixel_px=(2,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -250,7 +244,7 @@ class Calibration:
     covariance_parts: CovarianceParts | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+        freeze(self, covariance=(6, 6))
 
     def reproject(self, points_radar_m: Points3) -> Points2:
         """Project positions (n, 3) [m] as the radar reports them to pixels (n, 2); NaN where the lens does not see them."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Vector3, freeze
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.options import RadarOptions
 
@@ -24,8 +24,7 @@ class RadarAxesSigma:
     rotation_rad: Vector3
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
-        object.__setattr__(self, "rotation_rad", frozen_array(self.rotation_rad, (3,)))
+        freeze(self, position_m=(3,), rotation_rad=(3,))
 
 
 def sigma_in_radar_axes(camera_from_radar: RigidTransform, covariance: Matrix66) -> RadarAxesSigma:

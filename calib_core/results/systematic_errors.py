@@ -26,7 +26,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Values, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Values, Vector3, freeze, frozen_array
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unsolvable
@@ -179,8 +179,7 @@ class LensPrior:
     axes: np.ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "moves", frozen_array(self.moves, (None, len(self.names))))
-        object.__setattr__(self, "axes", frozen_array(self.axes, (len(self.names), None)))
+        freeze(self, moves=(None, len(self.names)), axes=(len(self.names), None))
 
     def __len__(self) -> int:
         return self.axes.shape[1]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Points2, Points3, Values, Vector2, Vector3, freeze
 from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -34,10 +34,9 @@ class BoardPattern:
     paper: np.ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x_m", frozen_array(self.x_m, (None,)))
-        object.__setattr__(self, "y_m", frozen_array(self.y_m, (None,)))
+        freeze(self, x_m=(None,), y_m=(None,))
         shape = (len(self.y_m) - 1, len(self.x_m) - 1)
-        object.__setattr__(self, "paper", frozen_array(self.paper, shape, dtype=np.float32))
+        freeze(self, np.float32, paper=shape)
 
 
 def checkerboard(board: Board) -> BoardPattern:
@@ -72,8 +71,7 @@ class PrintedBoard:
     sag_m: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "corners_m", frozen_array(self.corners_m, (None, 3)))
-        object.__setattr__(self, "middle_m", frozen_array(self.middle_m, (3,)))
+        freeze(self, corners_m=(None, 3), middle_m=(3,))
 
     def height_m(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return z of the surface at x, y [m]."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
@@ -232,11 +232,8 @@ class Targets:
 
     def __post_init__(self) -> None:
         n = len(self.points_radar_m)
-        for name in ("points_radar_m", "bias"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (n, 3)))
-        for name in ("velocity_mps", "rcs_dbsm", "fading_db"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (n,)))
-        object.__setattr__(self, "hidden", frozen_array(self.hidden, (n,), dtype=np.bool_))
+        freeze(self, points_radar_m=(n, 3), bias=(n, 3), velocity_mps=(n,), rcs_dbsm=(n,), fading_db=(n,))
+        freeze(self, np.bool_, hidden=(n,))
 
     def __len__(self) -> int:
         return len(self.points_radar_m)
@@ -262,7 +259,7 @@ class Measured:
     target: Indices
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "target", frozen_array(self.target, (len(self.scan),), dtype=np.int64))
+        freeze(self, np.int64, target=(len(self.scan),))
 
 
 def measure(

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, Points3, Vector3, frozen_array
+from calib_core.arrays import Flags, Points2, Points3, Vector3, freeze
 from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -188,9 +188,8 @@ class SimulatedPairs:
 
     def __post_init__(self) -> None:
         n = len(self.pairs)
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (n, 3)))
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (n, 2)))
-        object.__setattr__(self, "outlier", frozen_array(self.outlier, (n,), dtype=np.bool_))
+        freeze(self, points_radar_m=(n, 3), pixels_px=(n, 2))
+        freeze(self, np.bool_, outlier=(n,))
 
     @property
     def camera(self) -> Camera:

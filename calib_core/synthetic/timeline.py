@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, TimesNs, Values, frozen_array
+from calib_core.arrays import Flags, TimesNs, Values, freeze
 from calib_core.measurements import NS_PER_S
 
 _ISLAND_S = (2.0, 15.0)
@@ -31,9 +31,8 @@ class SensorTimes:
 
     def __post_init__(self) -> None:
         m = len(self.moment_s)
-        object.__setattr__(self, "moment_s", frozen_array(self.moment_s, (m,)))
-        for name in ("header_ns", "receive_ns"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (m,), dtype=np.int64))
+        freeze(self, moment_s=(m,))
+        freeze(self, np.int64, header_ns=(m,), receive_ns=(m,))
 
     def __len__(self) -> int:
         return len(self.moment_s)
@@ -55,8 +54,7 @@ class Islands:
 
     def __post_init__(self) -> None:
         k = len(self.starts_s)
-        for name in ("starts_s", "ends_s", "delays_s"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (k,)))
+        freeze(self, starts_s=(k,), ends_s=(k,), delays_s=(k,))
 
     def recorded(self, times_s: Values) -> Flags:
         """Return which times of the story are recorded."""

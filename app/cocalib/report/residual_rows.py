@@ -6,7 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Points2, Points3, Values, freeze
 from calib_core.evaluation.figures import ResidualFigures
 from calib_core.measurements import ReflectorClick
 from calib_core.radar import polar_from_cartesian
@@ -52,11 +52,17 @@ class ResidualRows:
     solved_from: bool
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (None, 3)))
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
-        object.__setattr__(self, "projected_px", frozen_array(self.projected_px, (None, 2)))
-        for name in ("times_s", "expected_px", "held_out_px", "outlier_probability", "influence"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,)))
+        freeze(
+            self,
+            points_radar_m=(None, 3),
+            pixels_px=(None, 2),
+            projected_px=(None, 2),
+            times_s=(None,),
+            expected_px=(None,),
+            held_out_px=(None,),
+            outlier_probability=(None,),
+            influence=(None,),
+        )
 
     def __len__(self) -> int:
         return len(self.ids)

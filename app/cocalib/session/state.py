@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from calib_core.arrays import Indices, TimesNs, frozen_array
+from calib_core.arrays import Indices, TimesNs, freeze
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
@@ -107,8 +107,7 @@ class RecordingFacts:
     assumptions: tuple[AssumedReading, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("image_times", "radar_times"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
+        freeze(self, np.int64, image_times=(None,), radar_times=(None,))
 
     @property
     def has_images(self) -> bool:

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from calib_core.arrays import frozen_array
+from calib_core.arrays import freeze
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
@@ -34,8 +34,7 @@ class RectificationMaps:
     y_px: np.ndarray
 
     def __post_init__(self) -> None:
-        for name in ("x_px", "y_px"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (None, None), dtype=np.float32))
+        freeze(self, np.float32, x_px=(None, None), y_px=(None, None))
 
 
 def rectified_camera(camera: Camera) -> Camera:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, Values, frozen_array
+from calib_core.arrays import Points2, Points3, Values, freeze
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.estimation.pair_results import averaged_distances_px
@@ -46,8 +46,7 @@ class CheckPairs:
     radar_errors: RadarErrors = field(default_factory=RadarErrors)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (None, 3)))
-        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
+        freeze(self, points_radar_m=(None, 3), pixels_px=(None, 2))
 
     def under(self, calibration: Calibration) -> "CheckPairs":
         """Take out of the positions what a calibration says that this radar gets wrong."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from calib_core.arrays import Matrix33, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Vector3, freeze
 from calib_core.interchange.format import Direction, looks_like_camera, looks_like_radar
 
 Part = Literal["rotation", "translation", "other"]
@@ -177,7 +177,7 @@ class RotationReading:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
+        freeze(self, rotation=(3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,7 +193,7 @@ class PoseReading:
     translation: Vector3
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "translation", frozen_array(self.translation, (3,)))
+        freeze(self, translation=(3,))
 
 
 @dataclass(frozen=True, slots=True)

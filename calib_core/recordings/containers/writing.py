@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import frozen_array
+from calib_core.arrays import freeze
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
@@ -65,7 +65,7 @@ class CloudMessage:
     values: np.ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, (None, len(self.names)), dtype=np.float32))
+        freeze(self, np.float32, values=(None, len(self.names)))
 
 
 @dataclass(frozen=True, slots=True)

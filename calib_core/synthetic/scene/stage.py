@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Vector2, Vector3, frozen_array
+from calib_core.arrays import Flags, Points3, Vector2, Vector3, freeze
 from calib_core.camera import Camera
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform
@@ -319,8 +319,7 @@ class SimulatedPlacement:
     best_image_time: TimeNs
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        freeze(self, position_radar_m=(3,), pixel_px=(2,))
 
 
 def placements_of(stage: Stage) -> tuple[SimulatedPlacement, ...]:

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, Points3, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Flags, Points2, Points3, Values, Vector2, Vector3, freeze, frozen_array
 from calib_core.errors import OptionError
 from calib_core.synthetic.options import Traffic
 from calib_core.synthetic.scene.person import PersonState
@@ -258,8 +258,7 @@ class Mover:
 
     def __post_init__(self) -> None:
         k = len(self.times_s)
-        object.__setattr__(self, "times_s", frozen_array(self.times_s, (k,)))
-        object.__setattr__(self, "places_m", frozen_array(self.places_m, (k, 2)))
+        freeze(self, times_s=(k,), places_m=(k, 2))
         object.__setattr__(self, "headings_rad", frozen_array(np.unwrap(self.headings_rad), (k,)))
         steps = np.linalg.norm(np.diff(self.places_m, axis=0), axis=1)
         object.__setattr__(self, "walked_m", frozen_array(np.concatenate([[0.0], np.cumsum(steps)]), (k,)))
@@ -412,8 +411,7 @@ class PasserBy:
     stop_s: float
 
     def __post_init__(self) -> None:
-        for name in ("from_m", "to_m"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (2,)))
+        freeze(self, from_m=(2,), to_m=(2,))
 
     def at(self, time_s: float) -> PersonState | None:
         """Return the person at a time; None before they come and after they have left."""
