@@ -15,8 +15,8 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.recordings.field_words import units_for
 from calib_core.results import Calibration
-from cocalib.session import Outcome
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
+from cocalib.session.state import Outcome
 from cocalib.solving.solving import solve_clicks
 
 SPEED_UNIT = "speed-unit"
