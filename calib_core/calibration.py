@@ -166,11 +166,15 @@ def _robust(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
 
 def _as_printed(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
     """Solve by Algorithm 1 of the paper; existing pairs from its RANSAC on."""
-    from calib_core.paper.algorithm_1 import calibrate_as_printed, solve_pairs_as_printed
+    from calib_core.paper.algorithm_1 import Placement, calibrate_as_printed, solve_pairs_as_printed
 
     camera, options = given.camera, given.options
     if given.scans is not None:
-        yield calibrate_as_printed(given.clicks, given.scans, camera, options)
+        pairing = pair_clicks(given.clicks, given.scans, options, background=given.background)
+        placements = {
+            pair.id: Placement(pair.candidates[0].position_radar_m, pair.chosen is not None) for pair in pairing.pairs
+        }
+        yield calibrate_as_printed(given.clicks, given.scans, camera, options, placements)
     else:
         yield solve_pairs_as_printed(checked_pairs(given.pairs, with_noise=False), camera, options, given.excluded)
 

@@ -236,6 +236,12 @@ class PaperOptions:
         "Centred on the nearest stamp as in the paper, or as the authors do: 1 s on either side of that stamp's whole second.",
     )
     window_s: float = option(3.0, "Length of the centred window [s].", low=0.01, high=60.0)
+    region_m: float = option(
+        1.0,
+        "Placement range [m]: returns farther from the placement are left out before the z-score; 0: none, as printed.",
+        low=0.0,
+        high=100.0,
+    )
     max_range_m: float = option(20.0, "Range filter of Algorithm 1 [m].", low=0.1, high=1000.0)
     max_speed_mps: float = option(
         0.0, "Velocity filter of Algorithm 1 [m/s]: exactly 0 in the paper.", low=0.0, high=100.0
@@ -274,7 +280,7 @@ class CalibrationOptions:
 
     method: Method = option(
         "default",
-        "The robust estimator, or the paper's Algorithm 1 as printed.",
+        "The robust estimator, or the paper's Algorithm 1, which weighs nothing, leaves no wrong pair out and states no error.",
     )
     gating: GatingOptions = field(default_factory=GatingOptions)
     locating: LocatingOptions = field(default_factory=LocatingOptions)

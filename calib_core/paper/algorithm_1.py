@@ -4,7 +4,7 @@ Cheng, Sengupta, Cao: "3D Radar and Camera Co-Calibration". It serves for compar
 Choices that the paper leaves open are in PaperOptions.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.options import CalibrationOptions, PaperOptions
-from calib_core.paper.checks import unused_choices, warnings_as_printed
+from calib_core.paper.checks import about_placements, judged_by_noise
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.results import Calibration, PairResult
 from calib_core.results.metrics import aed, distances, metrics_of
@@ -50,6 +50,19 @@ class ScoredPose:
         object.__setattr__(self, "inliers", frozen_array(self.inliers, (None,), dtype=np.bool_))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where the reflector stood at a click, as far as the radar shows.
+
+    Attributes:
+        position_radar_m: (3,) [m].
+        chosen: a person chose it; otherwise it is the radar's candidate with the highest score.
+    """
+
+    position_radar_m: Vector3
+    chosen: bool
+
+
 def clicks_by_time(clicks: Iterable[ReflectorClick]) -> tuple[ReflectorClick, ...]:
     """Algorithm 1, line 1: list the clicked pixels with the recorded stamps of their frames, sorted by time.
 
@@ -67,15 +80,7 @@ def static_returns_as_printed(scans: RadarScans, options: PaperOptions) -> Radar
     range_m = np.linalg.norm(scans.points_radar_m, axis=1)
     with np.errstate(invalid="ignore"):
         keep = (np.abs(scans.doppler_mps) <= options.max_speed_mps) & (range_m < options.max_range_m)
-    counts = np.bincount(scans.scan_of_return()[keep], minlength=len(scans))
-    return RadarScans(
-        times_ns=scans.times_ns[counts > 0],
-        first_return=np.concatenate([[0], np.cumsum(counts[counts > 0])]),
-        points_radar_m=scans.points_radar_m[keep],
-        doppler_mps=scans.doppler_mps[keep],
-        snr_db=scans.snr_db[keep],
-        sigma_polar=scans.sigma_polar[keep],
-    )
+    return _kept(scans, keep)
 
 
 def nearest_stamp(static: RadarScans, image_time: TimeNs) -> TimeNs:
@@ -94,6 +99,16 @@ def window_around(static: RadarScans, radar_time: TimeNs, options: PaperOptions)
         return static.between(TimeNs(second - NS_PER_S), TimeNs(second + NS_PER_S))
     half_ns = round(options.window_s * NS_PER_S / 2)
     return static.between(TimeNs(radar_time - half_ns), TimeNs(radar_time + half_ns))
+
+
+def in_placement_range(window: RadarScans, placement: Placement | None, options: PaperOptions) -> RadarScans:
+    """Keep the returns within `region_m` of the placement, as the text after the z-score asks: "filtered based on whether the
+    calibration target is static and its placement range". The pseudocode has no such line.
+    """
+    if placement is None or not options.region_m:
+        return window
+    near = np.linalg.norm(window.points_radar_m - placement.position_radar_m, axis=1) <= options.region_m
+    return _kept(window, near)
 
 
 def z_score_inliers(points_radar_m: Points3, options: PaperOptions) -> Flags:
@@ -150,13 +165,16 @@ def refined_on_all_pairs(
     return refine_lm(points_radar_m, pixels_px, camera, camera_from_radar)
 
 
-def pair_as_printed(click: ReflectorClick, static: RadarScans, options: CalibrationOptions) -> Pair | Unpaired:
+def pair_as_printed(
+    click: ReflectorClick, static: RadarScans, options: CalibrationOptions, placement: Placement | None = None
+) -> Pair | Unpaired:
     """Algorithm 1, lines 3 to 6 for one click: return its pair, or why it has none.
 
     Args:
         click: one click.
         static: the returns kept by line 2.
         options: the paper's, and the largest time gap to a scan, which the paper does not give.
+        placement: where the reflector stood; None for no placement range.
     """
     if not len(static):
         return _nothing_static(click, options)
@@ -165,6 +183,11 @@ def pair_as_printed(click: ReflectorClick, static: RadarScans, options: Calibrat
     if gap_s > options.locating.max_time_gap_s:
         return _nothing_static(click, options, gap_s)
     window = window_around(static, radar_time, options.paper)
+    around = in_placement_range(window, placement, options.paper)
+    if placement is not None and len(window.points_radar_m) and not len(around.points_radar_m):
+        facts = {"returns": len(window.points_radar_m), "region_m": options.paper.region_m}
+        return Unpaired("nothing-in-range", facts, id=click.id)
+    window = around
     inliers = z_score_inliers(window.points_radar_m, options.paper)
     if not inliers.any():
         return Unpaired(
@@ -194,7 +217,11 @@ def pair_as_printed(click: ReflectorClick, static: RadarScans, options: Calibrat
 
 
 def calibrate_as_printed(
-    clicks: Iterable[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions
+    clicks: Iterable[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions,
+    placements: Mapping[str, Placement] | None = None,
 ) -> Calibration | Unsolvable:
     """Run Algorithm 1, lines 1 to 10. The order of the clicks does not matter.
 
@@ -203,10 +230,12 @@ def calibrate_as_printed(
         scans: of the radar, as recorded.
         camera: intrinsics.
         options: `paper` contains the choices that the paper leaves open.
+        placements: where the reflector stood, by the ids of clicks; a click without one has no placement range.
     """
+    placements = placements or {}
     ordered = clicks_by_time(clicks)
     static = static_returns_as_printed(scans, options.paper)
-    found = [pair_as_printed(click, static, options) for click in ordered]
+    found = [pair_as_printed(click, static, options, placements.get(click.id)) for click in ordered]
     unpaired = tuple(pair for pair in found if isinstance(pair, Unpaired))
     outcome = _solved(
         [pair for pair in found if isinstance(pair, Pair)],
@@ -217,7 +246,8 @@ def calibrate_as_printed(
     )
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=unpaired, pairs=tuple(pair for pair in found if isinstance(pair, Pair)))
-    return replace(outcome, warnings=(*outcome.warnings, *unused_choices(ordered)))
+    used = [placements[click.id].chosen for click in ordered if click.id in placements]
+    return replace(outcome, warnings=(*outcome.warnings, *about_placements(ordered, used, options.paper)))
 
 
 def solve_pairs_as_printed(
@@ -266,8 +296,11 @@ def _solved(
     camera_from_radar = refined_on_all_pairs(points_radar_m, pixels_px, camera, better.camera_from_radar)
     if camera_from_radar is None:
         return Unsolvable("refinement-diverged")
-    inliers = frozenset(pair.id for pair, inlier in zip(used, better.inliers, strict=True) if inlier)
-    results = tuple(_result(pair, camera, camera_from_radar, pair.id in inliers, excluded) for pair in ordered)
+    agreeing, warnings = judged_by_noise(
+        [pair.id for pair in used], points_radar_m, pixels_px, camera, camera_from_radar, better.inliers, options
+    )
+    agree = frozenset(pair.id for pair, agrees in zip(used, agreeing, strict=True) if agrees)
+    results = tuple(_result(pair, camera, camera_from_radar, pair.id in agree, excluded) for pair in ordered)
     distances_px = np.sort([result.distance_px for result in results if not result.excluded])
     return Calibration(
         camera_from_radar=camera_from_radar,
@@ -276,15 +309,7 @@ def _solved(
         metrics=metrics_of(distances_px[np.isfinite(distances_px)]),
         pairs=results,
         unpaired=unpaired,
-        warnings=warnings_as_printed(
-            [pair.id for pair in used],
-            points_radar_m,
-            pixels_px,
-            camera,
-            camera_from_radar,
-            better.inliers,
-            options,
-        ),
+        warnings=warnings,
         options=options,
         iterative_px=float("nan") if iterative is None else iterative.mean_error_px,
         sqpnp_px=float("nan") if sqpnp is None else sqpnp.mean_error_px,
@@ -323,6 +348,19 @@ def _pose_by_ransac(
         return None
     projected_px = camera.project(solution.camera_from_radar @ points_radar_m)
     return ScoredPose(solution.camera_from_radar, solution.inliers, aed(distances(projected_px, pixels_px)))
+
+
+def _kept(scans: RadarScans, keep: Flags) -> RadarScans:
+    """Keep some returns; scans left empty are dropped."""
+    counts = np.bincount(scans.scan_of_return()[keep], minlength=len(scans))
+    return RadarScans(
+        times_ns=scans.times_ns[counts > 0],
+        first_return=np.concatenate([[0], np.cumsum(counts[counts > 0])]),
+        points_radar_m=scans.points_radar_m[keep],
+        doppler_mps=scans.doppler_mps[keep],
+        snr_db=scans.snr_db[keep],
+        sigma_polar=scans.sigma_polar[keep],
+    )
 
 
 def _z_scores(values: Values) -> Values:

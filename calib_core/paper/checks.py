@@ -15,36 +15,39 @@ from calib_core.estimation.measurement_model import Linearization, linearize
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.measurements import ReflectorClick
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import DataWarning
 
-_MOST_DISAGREEING = 0.35
-_NOISE_EXCESS = 2.5  # of the mean squared residual
+_MISFIT = 13.816  # squared standard deviations, two degrees of freedom: 1 of 1,000
+_CONTRADICTED = 4.0
 _FAR_CAMERA = 3.0  # expected distances
 _TRUSTED_ROTATION_RAD = np.deg2rad(1.0)  # an error of a method that states no uncertainty is not expected to be larger
 _TRUSTED_POSITION_M = 0.25
 _SURE_SIGMAS = 2.9  # exceeded in 1 of 300 poses
 
 
-def unused_choices(clicks: Iterable[ReflectorClick]) -> tuple[DataWarning, ...]:
-    """Say that Algorithm 1 averages all returns of a window, also where a person chose one."""
+def about_placements(
+    clicks: Iterable[ReflectorClick], chosen: Sequence[bool], options: PaperOptions
+) -> tuple[DataWarning, ...]:
+    """Say where the placement ranges come from; without them, that the average takes in all returns, whatever was chosen."""
+    if options.region_m and chosen:
+        facts = {"chosen": sum(chosen), "by_score": len(chosen) - sum(chosen), "region_m": options.region_m}
+        return (DataWarning("placement-ranges", facts),)
     count = sum(click.chosen is not None and click.counts for click in clicks)
-    if not count:
-        return ()
-    return (DataWarning("choices-unused", {"clicks": count}),)
+    return (DataWarning("choices-unused", {"clicks": count}),) if count else ()
 
 
-def warnings_as_printed(
+def judged_by_noise(
     ids: Sequence[str],
     points_radar_m: Points3,
     pixels_px: Points2,
     camera: Camera,
     camera_from_radar: RigidTransform,
-    agreeing: Flags,
+    inliers: Flags,
     options: CalibrationOptions,
-) -> tuple[DataWarning, ...]:
-    """Return the warnings about a pose of Algorithm 1.
+) -> tuple[Flags, tuple[DataWarning, ...]]:
+    """Return which pairs agree with a pose of Algorithm 1 under the assumed noise (n,), and the warnings about it.
 
     Args:
         ids: of the n pairs that took part.
@@ -52,19 +55,21 @@ def warnings_as_printed(
         pixels_px: (n, 2) their clicks.
         camera: intrinsics.
         camera_from_radar: the pose.
-        agreeing: (n,) RANSAC's inliers.
+        inliers: (n,) RANSAC's.
         options: the assumed noise, RANSAC's threshold and the expected distance of the camera.
     """
     hidden = np.isnan(camera.project(camera_from_radar @ points_radar_m)).any(axis=1)
     fit = _modelled(points_radar_m[~hidden], pixels_px[~hidden], camera, camera_from_radar, options)
-    return (
+    agreeing = ~hidden
+    agreeing[~hidden] = fit.model.squared <= _MISFIT
+    warnings = (
         *implausible_input(ids, points_radar_m, pixels_px, camera, options),
-        *_disagreeing(ids, agreeing, fit, options),
+        *_contradicted(fit, agreeing, inliers, options),
         *_behind(ids, hidden),
-        *_excess(fit),
         *_spread(fit, camera_from_radar),
         *_far_camera(camera_from_radar, options),
     )
+    return agreeing, warnings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,12 +85,6 @@ class _Modelled:
     model: Linearization
     degrees_of_freedom: int
     excess: float
-
-    @property
-    def noisy(self) -> bool:
-        """Whether the residuals are larger than the assumed noise explains."""
-        degrees = self.degrees_of_freedom
-        return degrees >= 1 and self.excess >= max(_NOISE_EXCESS, 1.0 + 4.0 * np.sqrt(2.0 / degrees))
 
 
 def _modelled(
@@ -108,31 +107,23 @@ def _modelled(
     return _Modelled(model, degrees, float(model.squared.sum()) / max(degrees, 1))
 
 
-def _disagreeing(ids: Sequence[str], agreeing: Flags, fit: _Modelled, options: CalibrationOptions) -> list[DataWarning]:
-    if np.mean(~agreeing) <= _MOST_DISAGREEING or not fit.noisy:
+def _contradicted(fit: _Modelled, agreeing: Flags, inliers: Flags, options: CalibrationOptions) -> list[DataWarning]:
+    if fit.degrees_of_freedom < 1 or fit.excess <= _CONTRADICTED:
         return []
-    return [
-        DataWarning(
-            "many-outliers",
-            {
-                "agreeing": int(agreeing.sum()),
-                "pairs": len(ids),
-                "threshold_px": options.paper.ransac_threshold_px,
-            },
-        )
-    ]
+    facts = {
+        "chi2_per_degree": fit.excess,
+        "agreeing": int(agreeing.sum()),
+        "inliers": int(inliers.sum()),
+        "pairs": len(agreeing),
+        "threshold_px": options.paper.ransac_threshold_px,
+    }
+    return [DataWarning("algorithm-1-contradicted", facts)]
 
 
 def _behind(ids: Sequence[str], hidden: Flags) -> list[DataWarning]:
     if not hidden.any():
         return []
     return [DataWarning("behind-camera", {"ids": np.asarray(ids)[hidden].tolist(), "pairs": len(ids)})]
-
-
-def _excess(fit: _Modelled) -> list[DataWarning]:
-    if not fit.noisy:
-        return []
-    return [DataWarning("residuals-too-large", {"chi2_per_degree": fit.excess, "paper": True})]
 
 
 def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarning]:

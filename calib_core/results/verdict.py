@@ -318,6 +318,7 @@ not hold; it rests on an assumption, so it cannot be called good; nothing."""
 CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "clocks-apart",
+        "algorithm-1-contradicted",
         "behind-camera",
         "mirrored-axes",
         "units-suspected",

@@ -51,6 +51,14 @@ def no_z_score_inlier(*, returns: int, z_score_threshold: float) -> Remark:
     )
 
 
+def nothing_in_range(*, returns: int, region_m: float) -> Remark:
+    return remark(
+        f"none of the {returns} returns that Algorithm 1 keeps is within {region_m:g} m of the placement",
+        "raise the placement range or the velocity filter, or choose the return of this click",
+        SetOption("paper.region_m"),
+    )
+
+
 def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
     side = "left" if azimuth_deg > 0 else "right"
     return remark(
@@ -60,7 +68,7 @@ def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
     )
 
 
-UNPAIRED = by_code(chosen_return_missing, no_scan, no_static_return, no_z_score_inlier)
+UNPAIRED = by_code(chosen_return_missing, no_scan, no_static_return, no_z_score_inlier, nothing_in_range)
 
 
 def unpaired_told(click: Unpaired) -> Remark:

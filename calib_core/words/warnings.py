@@ -47,18 +47,23 @@ def few_pairs(*, agreeing: int, pairs: int, needed: int, clear: bool) -> Remark:
     return remark(seen, "add placements: ten or more, near and far, on both sides")
 
 
-def many_outliers(
-    *, pairs: int, ids: Sequence[str] = (), agreeing: int | None = None, threshold_px: float = 0.0
+def algorithm_1_contradicted(
+    *, chi2_per_degree: float, agreeing: int, inliers: int, pairs: int, threshold_px: float
 ) -> Remark:
-    """Given when more than 35 % of the pairs do not fit; for Algorithm 1, only if its residuals also exceed the assumed
-    noise.
+    """Given when Algorithm 1 only: its residuals are far larger than the assumed noise.
+
+    Could also be: a radar, or clicks, several times noisier than assumed.
     """
-    if agreeing is not None:
-        return remark(
-            f"only {agreeing} of {pairs} pairs agree within {threshold_px:g} px, but Algorithm 1 fits the pose to all of them",
-            "use the default method, which leaves wrong pairs out; or exclude the pairs with the largest residuals",
-            SetOption("method", "default"),
-        )
+    return remark(
+        f"the residuals of Algorithm 1 are {np.sqrt(chi2_per_degree):.1f} times what the assumed noise explains: {agreeing} of "
+        f"{pairs} pairs agree with its pose, {inliers} within the {threshold_px:g} px of RANSAC",
+        "use the default method, which leaves wrong pairs out; or choose the returns of the pairs with the largest residuals",
+        SetOption("method", "default"),
+    )
+
+
+def many_outliers(*, pairs: int, ids: Sequence[str] = ()) -> Remark:
+    """Given when more than 35 % of the pairs do not fit."""
     return remark(
         say("{outliers} of {pairs} pairs do not fit: {ids}", outliers=len(ids), pairs=pairs, ids=listed(ids)),
         f"check each of them: {_ONE_BY_ONE}",
@@ -66,20 +71,14 @@ def many_outliers(
     )
 
 
-def residuals_too_large(*, chi2_per_degree: float, paper: bool = False) -> Remark:
+def residuals_too_large(*, chi2_per_degree: float) -> Remark:
     """Given when residuals are far larger than the assumed noise.
 
     Could also be: the cause.
     """
-    message = (
-        f"residuals are {np.sqrt(chi2_per_degree):.1f} times what the assumed noise explains "
-        f"(chi2 / degrees of freedom {chi2_per_degree:.1f})"
-    )
-    if paper:
-        hint = "some radar positions or clicks are wrong: use the default method, and check the pairs it names"
-        return remark(message, hint, SetOption("method", "default"))
     return remark(
-        message,
+        f"residuals are {np.sqrt(chi2_per_degree):.1f} times what the assumed noise explains "
+        f"(chi2 / degrees of freedom {chi2_per_degree:.1f})",
         "check that the intrinsics belong to this camera, lens and image size, that every click is on the reflector's inner "
         "corner, and the assumed radar noise",
     )
@@ -738,6 +737,16 @@ def choices_unused(*, clicks: int) -> Remark:
     )
 
 
+def placement_ranges(*, chosen: int, by_score: int, region_m: float) -> Remark:
+    """Given when Algorithm 1 only: returns far from a placement were left out, and it says where the placements come from: the
+    returns that a person chose, or else the radar's own candidates with the highest score.
+    """
+    return remark(
+        f"placement ranges of {region_m:g} m: {chosen} chosen, {by_score} by the radar's score",
+        "choose the return of a pair whose placement the radar does not show clearly",
+    )
+
+
 def behind_camera(*, ids: Sequence[str], pairs: int) -> Remark:
     """Given when Algorithm 1 only: its pose puts radar positions behind the camera."""
     return remark(
@@ -761,6 +770,7 @@ def no_camera() -> Remark:
 
 SOLVER = by_code(
     agreeing_outliers,
+    algorithm_1_contradicted,
     angle_scale,
     behind_camera,
     camera_far_away,
@@ -783,6 +793,7 @@ SOLVER = by_code(
     nobody_confirmed,
     one_pair_decides,
     pixels_suspected,
+    placement_ranges,
     radar_axes_suspected,
     repeated_placements,
     residuals_too_large,

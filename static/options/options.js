@@ -11,7 +11,7 @@ const page = /** @type {HTMLElement} */ (document.getElementById("page-options")
 /** The most used options. */
 const FIRST = [
   "locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position",
-  "paper.ransac_threshold_px", "paper.window_s", "paper.max_range_m",
+  "paper.region_m", "paper.ransac_threshold_px", "paper.window_s", "paper.max_range_m",
 ];
 /** Options that a method ignores. @type {Record<string, (path: string) => boolean>} */
 const IDLE = {
@@ -24,6 +24,7 @@ const LABELS = {
   "noise.sigma_px": "Click uncertainty",
   "gating.max_range_m": "Maximum range",
   "solving.camera_position": "Measured camera position",
+  "paper.region_m": "Placement range",
   "paper.ransac_threshold_px": "RANSAC threshold",
   "paper.window_s": "Radar window around a click",
   "paper.max_range_m": "Maximum range",
@@ -59,7 +60,7 @@ const METHODS = { default: "Default", paper: "Paper" };
 /** @type {Record<string, string>} */
 const METHOD_HINTS = {
   default: "The default method: detects wrong pairs, models the noise of radar and clicks, reports the uncertainty of the pose.",
-  paper: "Algorithm 1 of the paper, line by line: average, RANSAC, Levenberg-Marquardt.",
+  paper: "Algorithm 1 of the paper, line by line: average, RANSAC, Levenberg-Marquardt. It weighs nothing, leaves no wrong pair out and states no error.",
 };
 /** @type {Map<string, (value: any) => void>} */
 const writers = new Map();

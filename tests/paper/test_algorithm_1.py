@@ -20,9 +20,11 @@ from calib_core.measurements import (
 )
 from calib_core.options import CalibrationOptions, LocatingOptions, PaperOptions
 from calib_core.paper.algorithm_1 import (
+    Placement,
     ScoredPose,
     calibrate_as_printed,
     clicks_by_time,
+    in_placement_range,
     mean_position,
     nearest_stamp,
     pair_as_printed,
@@ -39,6 +41,7 @@ from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 from calib_core.results.actions import SetOption
 from calib_core.results.metrics import aed, cdsd, distances
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import study_camera
 from calib_core.words.outcomes import outcome_told
@@ -197,6 +200,48 @@ def test_algorithm_1_line_4_can_take_the_authors_window_around_the_whole_second(
 
 
 # Line 5: the z-score of each axis
+
+
+def test_algorithm_1_the_placement_range_leaves_out_what_stands_farther_from_the_placement():
+    window = scans_of(
+        scan_of(0.0, [[5.0, 0.0, 0.0], [5.9, 0.0, 0.0]]), scan_of(0.1, [[6.1, 0.0, 0.0], [0.0, 5.0, 0.0]])
+    )
+    stood = Placement(np.array([5.0, 0.0, 0.0]), chosen=False)
+    near = in_placement_range(window, stood, AS_PRINTED)
+    np.testing.assert_array_equal(near.points_radar_m, window.points_radar_m[:2])
+    assert len(near) == 1
+    for whole in (
+        in_placement_range(window, None, AS_PRINTED),
+        in_placement_range(window, stood, replace(AS_PRINTED, region_m=0.0)),
+    ):
+        assert whole is window
+
+
+def test_algorithm_1_with_an_air_conditioner_in_every_window_needs_the_placement_range():
+    simulated = simulate_pairs(12, rng=np.random.default_rng(31), noise="none")
+    clicks, scans = recording_of(simulated)
+    owner, other = scans.scan_of_return(), np.array([8.0, 2.0, 1.0])
+    crowded = scans_of(
+        *(
+            scan_of((int(time) - START_NS) / NS_PER_S, [*scans.points_radar_m[owner == i], other, other + 0.1])
+            for i, time in enumerate(scans.times_ns)
+        )
+    )
+    places = {
+        click.id: Placement(pair.candidates[0].position_radar_m, i < 3)
+        for i, (click, pair) in enumerate(zip(clicks, simulated.pairs, strict=True))
+    }
+    result = solved(calibrate_as_printed(clicks, crowded, simulated.camera, OPTIONS, places))
+    assert rotation_angle_rad((result.camera_from_radar @ simulated.camera_from_radar.inverse()).rotation) < 1e-3
+    (note,) = (warning for warning in result.warnings if warning.code == "placement-ranges")
+    assert note.facts == {"chosen": 3, "by_score": 9, "region_m": 1.0}
+    assert all(pair.inlier for pair in result.pairs)
+    printed = replace(OPTIONS, paper=replace(AS_PRINTED, region_m=0.0))
+    outcome = calibrate_as_printed(clicks, crowded, simulated.camera, printed, places)
+    assert unsolvable(outcome).code == "points-in-one-line"
+    nowhere = {**places, clicks[0].id: Placement(np.array([-9.0, 0.0, 0.0]), chosen=True)}
+    (left_out,) = solved(calibrate_as_printed(clicks, crowded, simulated.camera, OPTIONS, nowhere)).unpaired
+    assert (left_out.id, left_out.code) == (clicks[0].id, "nothing-in-range")
 
 
 def test_algorithm_1_line_5_judges_each_axis_by_its_z_score():
@@ -361,9 +406,11 @@ def test_algorithm_1_line_10_is_what_the_calibration_holds():
     )
     refined = refined_on_all_pairs(points, pixels, simulated.camera, start.camera_from_radar)
     np.testing.assert_array_equal(result.camera_from_radar.as_matrix(), refined.as_matrix())
-    inliers = {pair.id: pair.inlier for pair in result.pairs}
-    assert [inliers[simulated.pairs[i].id] for i in order] == start.inliers.tolist()
-    assert not all(inliers.values())
+    (contradicted,) = (warning for warning in result.warnings if warning.code == "algorithm-1-contradicted")
+    assert contradicted.facts["inliers"] == start.inliers.sum()
+    assert contradicted.facts["agreeing"] == sum(pair.inlier for pair in result.pairs)
+    assert not start.inliers.all()
+    assert verdict_on(result).level == "contradictory"
 
 
 # The whole algorithm
@@ -392,7 +439,7 @@ def test_algorithm_1_reports_aed_and_cdsd_over_all_pairs_and_claims_no_uncertain
     assert np.isnan(result.metrics.held_out_aed_px)
     assert np.isnan(result.covariance).all()
     # two pairs are wrong
-    assert [warning.code for warning in result.warnings] == ["residuals-too-large", "weak-geometry"]
+    assert [warning.code for warning in result.warnings] == ["algorithm-1-contradicted", "weak-geometry"]
     assert result.iterative_px > 0.0
     assert result.sqpnp_px > 0.0
     assert all(np.isnan(pair.outlier_probability) for pair in result.pairs)

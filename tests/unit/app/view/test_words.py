@@ -142,7 +142,10 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("lens-or-radar-scale", {"change": 0.02, "sigma": 0.01, "scales": [_SCALE]}),
     DataWarning("lost-returns", {"lost": 3, "read": 60, "where": "the radar around the clicks"}),
     DataWarning("many-outliers", {"ids": [f"c{number}" for number in range(1, 9)], "pairs": 20}),
-    DataWarning("many-outliers", {"agreeing": 5, "pairs": 20, "threshold_px": 8.0}),
+    DataWarning(
+        "algorithm-1-contradicted",
+        {"chi2_per_degree": 239.4, "agreeing": 2, "inliers": 5, "pairs": 20, "threshold_px": 8.0},
+    ),
     DataWarning("mirrored-axes", {"log_likelihood_ratio": 9.0}),
     DataWarning("mirrored-axes", {"camera_below_m": 0.7, "radar_above_m": 0.9}),
     DataWarning("no-consensus", {"agreeing": 5, "pairs": 20}),
@@ -154,7 +157,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("radar-axes-suspected", {"side": "left", "behind": 3, "pairs": 9}),
     DataWarning("repeated-placements", {"pairs": 9, "places": 4}),
     DataWarning("residuals-too-large", {"chi2_per_degree": 9.0}),
-    DataWarning("residuals-too-large", {"chi2_per_degree": 9.0, "paper": True}),
+    DataWarning("placement-ranges", {"chosen": 3, "by_score": 17, "region_m": 1.0}),
     DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),
     DataWarning("shared-error-suspected", {"angle": "azimuth", "slope_deg_per_m": 0.11, "slope_sigma_deg_per_m": 0.02}),
     DataWarning("shared-error-suspected", {"turned_deg": 1.2, "before": "c7", "after": "c8"}),
@@ -246,6 +249,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
         id="c1",
     ),
     Unpaired("no-static-return", {"paper": True, "fastest_mps": 0.1, "farthest_m": 60.0}, id="c1"),
+    Unpaired("nothing-in-range", {"returns": 7, "region_m": 1.0}, id="c1"),
     Unpaired("no-z-score-inlier", {"returns": 7, "z_score_threshold": 1.0}, id="c1"),
 )
 _ACTIONS: tuple[Action, ...] = (
