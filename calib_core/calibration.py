@@ -223,7 +223,7 @@ def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
     """Solve again from the pairs that a calibration kept; with the same options the result is the same, bit for bit.
 
-    Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks.
+    Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks and placement ranges.
 
     Args:
         calibration: solved here, or read from a calibration-1 file.
@@ -248,8 +248,12 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
     outcome = calibrate_pairs(kept, camera, options, excluded)
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=calibration.unpaired)
-    clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
-    return replace(outcome, unpaired=calibration.unpaired, warnings=(*outcome.warnings, *clock_warnings))
+    codes = CLOCK_CODES if options.models_noise else _OF_PLACEMENTS
+    of_recording = [warning for warning in calibration.warnings if warning.code in codes]
+    return replace(outcome, unpaired=calibration.unpaired, warnings=(*outcome.warnings, *of_recording))
+
+
+_OF_PLACEMENTS = ("placement-ranges", "choices-unused")
 
 
 def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
