@@ -223,7 +223,7 @@ def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
     """Solve again from the pairs that a calibration kept; with the same options the result is the same, bit for bit.
 
-    Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks and placement ranges.
+    Whatever depends on the recording is copied: clicks without a radar position, warnings about clocks and placement ranges.
 
     Args:
         calibration: solved here, or read from a calibration-1 file.
