@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import read_calibration
+from calib_core.interchange.own.calibration_json import read_calibration
 
 pytestmark = pytest.mark.real
 
@@ -39,3 +39,17 @@ def test_a_unit_of_the_speed_that_cannot_change_the_pose_is_a_note(cocalib, case
     distance_m, turn_deg = error_of(out, sample)
     assert distance_m < 0.15
     assert turn_deg < 1.5
+
+
+def test_rows_of_single_returns_are_split_into_scans_like_messages(cocalib, cases, sample):
+    answer = cocalib("info", "--json", cases / "02-rostopic-echo-p-csv" / "radar.csv", sample / "camera.bag")
+    radar = json.loads(answer.out)["radar"]
+    assert radar["scans"] == 1849
+    assert radar["longest_gap_s"] < 0.31
+
+
+def test_messages_as_rostopic_echo_writes_them_are_a_table_of_returns(cocalib, cases, sample):
+    answer = cocalib("info", "--json", cases / "01-rostopic-echo-text" / "radar.txt", sample / "camera.bag")
+    radar = json.loads(answer.out)["radar"]
+    assert radar["scans"] == 7
+    assert [row["column"] for row in radar["columns"]][:3] == ["x", "y", "z"]

@@ -15,7 +15,7 @@ from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import MappedColumn, is_plain
 from calib_core.recordings.plain_files.file_stamps import COUNTED, StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
-from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
+from calib_core.recordings.plain_files.tables.json_files import JsonTable, is_echo, open_json_table, read_json_rows
 from calib_core.recordings.plain_files.tables.text_tables import (
     TableRows,
     TextTable,
@@ -41,6 +41,7 @@ from calib_core.recordings.radar.column_guess import (
 )
 from calib_core.recordings.radar.column_plan import ColumnPlan, RadarAxes, StatedReading
 from calib_core.recordings.radar.columns import returns_from
+from calib_core.recordings.radar.message_layouts.single_returns import POINT_NUMBERS, SHORTEST_CYCLE_NS, first_of_scans
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_SUFFIXES)
@@ -84,7 +85,7 @@ class _Columns:
 
 
 def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
-    """Read a table of radar returns; rows with the same time form one scan.
+    """Read a table of radar returns; rows with the same time form one scan, and so do rows a few microseconds apart.
 
     Raises:
         RecordingError: a position or the time is missing, a unit is unknown, or a row is damaged.
@@ -103,10 +104,10 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         raise RecordingError(f"{path}: the file has a header but no rows")
     columns = columns.with_values(path, rows.values)
     order = np.argsort(rows.times_ns, kind="stable")
-    stamps, first = np.unique(rows.times_ns[order], return_index=True)
-    edges = np.append(first, len(order))
+    first = _first_of_scans(columns, rows.times_ns[order], rows.values[order])
+    stamps, edges = rows.times_ns[order][first], np.append(first, len(order))
     points = _points(columns, rows.values[order])
-    what = "radar JSON" if isinstance(table, JsonTable) else "radar CSV"
+    what = table.what if isinstance(table, JsonTable) else "radar CSV"
     return PlainSource(
         path,
         path.stat().st_size,
@@ -122,6 +123,21 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         mapped=bool(options.mapped),
         computed=_computed_words(columns.plan),
     )
+
+
+def _first_of_scans(columns: _Columns, times_ns: TimesNs, values: np.ndarray) -> np.ndarray:
+    """Return the row that begins each scan: a row with another time, or of rows with times of their own, as of messages."""
+    pauses_ns = np.diff(times_ns)
+    if np.count_nonzero((pauses_ns > 0) & (pauses_ns < SHORTEST_CYCLE_NS)) <= np.count_nonzero(pauses_ns == 0):
+        return np.unique(times_ns, return_index=True)[1]
+    numbers = next(
+        (values[:, n] for n, place in enumerate(columns.wanted) if _numbers_returns(columns.names[place])), None
+    )
+    return first_of_scans(times_ns, point_numbers=None if numbers is None else np.nan_to_num(numbers))
+
+
+def _numbers_returns(name: str) -> bool:
+    return name.lower().rpartition(".")[2] in POINT_NUMBERS
 
 
 def table_fault(path: Path, options: PlainOptions) -> str:
@@ -192,7 +208,7 @@ def open_table_folder(
 
 
 def _open(path: Path, options: PlainOptions) -> Table:
-    if path.suffix.lower() in JSON_SUFFIXES:
+    if path.suffix.lower() in JSON_SUFFIXES or is_echo(path):
         return open_json_table(path)
     table = open_text_table(path)
     require_header(table, options)
@@ -218,7 +234,9 @@ def _columns(table: Table, options: PlainOptions) -> _Columns:
     wanted = tuple(
         place
         for place, name in enumerate(names)
-        if name in taken or ((time is None or name != time.column) and table_meaning(name, units[place]) is not None)
+        if name in taken
+        or _numbers_returns(name)
+        or ((time is None or name != time.column) and table_meaning(name, units[place]) is not None)
     )
     try:
         times = choose_times(names, units, table.first_row, time, taken)

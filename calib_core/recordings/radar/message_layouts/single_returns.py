@@ -16,8 +16,10 @@ from calib_core.recordings.radar.message_layouts.samples import Samples, describ
 from calib_core.recordings.radar.registry import find_decoder, plan_for
 
 _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
-_POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
-_SHORTEST_CYCLE_NS = 5e6
+POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
+"""Fields that number the returns of a scan."""
+SHORTEST_CYCLE_NS = 5e6
+"""No radar measures more often [ns]."""
 _SAMPLED_RETURNS = 60
 
 
@@ -56,7 +58,7 @@ class PointLayout:
         if plan is None:
             return None
         decoder = find_decoder("point", (*names, *strings))
-        numbers = (decoder.point_number,) if decoder and decoder.point_number else _POINT_NUMBERS
+        numbers = (decoder.point_number,) if decoder and decoder.point_number else POINT_NUMBERS
         return cls(
             definition,
             plan,
@@ -208,6 +210,6 @@ def _between_scans_ns(pauses_ns: np.ndarray) -> float:
         logs = np.concatenate([[logs[0] - 1.0], logs])
     steps = np.diff(logs)
     if not len(steps) or steps.max() < np.log(2.0):
-        return max(float(positive[0]) / 2, _SHORTEST_CYCLE_NS)
+        return max(float(positive[0]) / 2, SHORTEST_CYCLE_NS)
     cut = int(np.argmax(steps))
     return float(np.exp((logs[cut] + logs[cut + 1]) / 2))

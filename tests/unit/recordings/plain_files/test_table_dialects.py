@@ -128,6 +128,27 @@ DIALECTS: dict[str, tuple[str, str, set[str]]] = {
               lambda t, x, y, z, v, s: f"{t + 5_000_000},1,{t},radar,{x},{y},{z},{v},{s}"),
         {"length-unit", "speed-unit"},
     ),
+    "a message a return, 9 us apart": (
+        "a.csv",
+        "time_ns,point_id,x_m,y_m,z_m,doppler_mps,snr_db\n" + "".join(
+            f"{t + 9000 * (n % 12)},{n % 12},{commas(*rest)}\n" for n, (t, *rest) in enumerate(T.rows)),
+        set(),
+    ),
+    "a message a return, unnumbered": (
+        "a.csv",
+        "time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n" + "".join(
+            f"{t + 9000 * (n % 12)},{commas(*rest)}\n" for n, (t, *rest) in enumerate(T.rows)),
+        set(),
+    ),
+    "ros2 topic echo": (
+        "a.txt",
+        "".join(
+            f"header:\n  stamp:\n    sec: {t // NS_PER_S}\n    nanosec: {t % NS_PER_S}\n  frame_id: 'radar'\ndetections:\n"
+            + "".join("- " + "\n  ".join(
+                f"{name}: {value}" for name, value in zip((*NAMES, "cov"), (*row, [0.1, 0.2]), strict=True)
+            ) + "\n" for row in rows) + "---\n" for t, rows in scans()),
+        set(),
+    ),
     "spaces": ("a.txt", table("time_ns x_m y_m z_m doppler_mps snr_db", lambda *v: "  ".join(map(str, v))), set()),
     "tabs and quotes": ("a.csv", table('"time_ns"\t"x_m"\t"y_m"\t"z_m"\t"doppler_mps"\t"snr_db"',
                                        lambda *v: "\t".join(f'"{one}"' for one in v)), set()),
