@@ -103,10 +103,9 @@ def about_speed_unit(
 
 def _with_slower_gate(options: CalibrationOptions, factor: float) -> CalibrationOptions:
     """Return options that keep the returns which are static if all speeds are divided by a factor."""
-    gating, paper = (
-        dataclasses.replace(one, max_speed_mps=min(one.max_speed_mps * factor, _FASTEST_MPS))
-        for one in (options.gating, options.paper)
-    )
+    gating_mps, paper_mps = (min(one.max_speed_mps * factor, _FASTEST_MPS) for one in (options.gating, options.paper))
+    gating = dataclasses.replace(options.gating, max_speed_mps=gating_mps)
+    paper = dataclasses.replace(options.paper, max_speed_mps=paper_mps)
     return dataclasses.replace(options, gating=gating, paper=paper)
 
 
