@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.simulated_pairs import NoiseName, draw_systematic_errors, simulate_pairs, study_camera
 from calib_core.arrays import Values
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.estimation.pose_change import AXES, PoseChange, pose_change
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import Rig, draw_systematic_errors, random_rig, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, study_camera
+from calib_core.synthetic.rig import Rig, random_rig
 
 __all__ = ["main"]
 

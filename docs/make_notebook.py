@@ -30,23 +30,33 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "import numpy as np\n\nimport cocalib as cc\nfrom calib_core.synthetic import simulate_pairs\n\n"
-        'simulated = simulate_pairs(20, rng=np.random.default_rng(1), noise="ti")\n'
-        "points_radar_m = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])\n"
-        "pixels_px = np.array([pair.pixel_px for pair in simulated.pairs])\n"
+        "import numpy as np\n\nimport cocalib as cc\n\nrng = np.random.default_rng(1)\n"
+        "matrix_px = np.array([[1250.0, 0.0, 959.5], [0.0, 1250.0, 539.5], [0.0, 0.0, 1.0]])\n"
+        'camera = cc.Camera("plumb_bob", 1920, 1080, matrix_px, np.array([-0.1, 0.02, 0.0, 0.0]))\n'
+        "optical_from_body = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])\n"
+        "truth = cc.RigidTransform(optical_from_body, -optical_from_body @ [0.0, 0.0, 0.045])\n\n\n"
+        "def from_polar(range_m, azimuth_rad, elevation_rad):\n"
+        '    """Return positions: x forward, y left, z up."""\n'
+        "    level_m = range_m * np.cos(elevation_rad)\n"
+        "    x_m, y_m = level_m * np.cos(azimuth_rad), level_m * np.sin(azimuth_rad)\n"
+        "    return np.stack([x_m, y_m, range_m * np.sin(elevation_rad)], axis=1)\n\n\n"
+        "polar = rng.uniform([3.0, -0.5, -0.3], [15.0, 0.5, 0.2], (20, 3))\n"
+        "noise = rng.normal(0.0, [0.015, 0.0096, 0.0175], (20, 3))  # m, rad, rad\n"
+        "points_radar_m = from_polar(*(polar + noise).T)\n"
+        "pixels_px = camera.project(truth @ from_polar(*polar.T)) + rng.normal(0.0, 2.0, (20, 2))\n"
         "print(points_radar_m.shape, pixels_px.shape)",
     ),
     (
         "code",
         "pairs = cc.pairs_from_arrays(points_radar_m, pixels_px)\n"
-        "calibration = cc.calibrate_pairs(pairs, simulated.camera).unwrap()\nprint(calibration)",
+        "calibration = cc.calibrate_pairs(pairs, camera).unwrap()\nprint(calibration)",
     ),
     (
         "markdown",
         "`unwrap` returns the calibration, or raises with a reason and a hint. Without it the answer is a value: either a "
         "`Calibration` or an `Unsolvable`.",
     ),
-    ("code", "print(cc.calibrate_pairs(pairs[:3], simulated.camera))"),
+    ("code", "print(cc.calibrate_pairs(pairs[:3], camera))"),
     (
         "markdown",
         "## How sure is it?\n\nThe covariance is of the pose error (dt, dtheta), in metres and radians. `pixel_sigma` carries "
@@ -55,7 +65,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "error = calibration.camera_from_radar.error_from(simulated.camera_from_radar)\n"
+        "error = calibration.camera_from_radar.error_from(truth)\n"
         "squared = error @ np.linalg.solve(calibration.covariance, error)\n"
         'print(f"squared distance {squared:.1f}, 95 % quantile {calibration.covariance_quantile:.1f}")\n'
         "for range_m in (3.0, 10.0, 30.0):\n"
@@ -73,14 +83,14 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "markdown",
-        "A tape measure helps most: where the camera sits in the radar frame, and how well that is known. The simulated "
+        "A tape measure helps most: where the camera sits in the radar frame, and how well that is known. This "
         "camera sits 4.5 cm above the radar.",
     ),
     (
         "code",
         'tape = cc.CameraPositionPrior.measured((0.0, 0.0, 0.045), "antenna")\n'
         "options = cc.CalibrationOptions(solving=cc.SolvingOptions(camera_position=tape))\n"
-        "measured = cc.calibrate_pairs(pairs, simulated.camera, options).unwrap()\n"
+        "measured = cc.calibrate_pairs(pairs, camera, options).unwrap()\n"
         'for name, one in (("free", calibration), ("with tape", measured)):\n'
         "    sigma = np.sqrt(np.diag(one.covariance))\n"
         "    position_cm, rotation_deg = 100 * np.linalg.norm(sigma[:3]), np.rad2deg(np.linalg.norm(sigma[3:]))\n"

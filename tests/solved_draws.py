@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import solve_gnc
@@ -18,8 +19,7 @@ from calib_core.options import (
     SolvingOptions,
     without_systematic_errors,
 )
-from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.simulated_pairs import PairsLayout
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 NARROW = PairsLayout(max_range_m=20.0, max_lateral_m=1.0)
 """An aisle of 2 m."""

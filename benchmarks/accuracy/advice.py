@@ -11,13 +11,12 @@ from benchmarks.accuracy.cases import Case, bound_of, draw, options_of
 from benchmarks.accuracy.figures import Measured, at_least, column, fewest, summed_up
 from benchmarks.accuracy.methods import solve_ours
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import FIELD, NOISE_PROFILES, NoiseName, SimulatedPairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.diagnostics.next_placement import PlacementLimits, next_placement
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration
-from calib_core.synthetic import FIELD, NOISE_PROFILES, SimulatedPairs
-from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "Advised", "measure_advice", "section"]
 

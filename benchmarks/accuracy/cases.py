@@ -5,6 +5,15 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.simulated_pairs import (
+    AISLE,
+    FIELD,
+    NOISE_PROFILES,
+    NoiseName,
+    SimulatedPairs,
+    simulate_pairs,
+    study_camera,
+)
 from calib_core.association.clustering import candidate_at
 from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import Pair
@@ -18,8 +27,7 @@ from calib_core.options import (
     SolvingOptions,
 )
 from calib_core.radar import covariance_from_sigma_polar, sigma_polar_of
-from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, study_camera
+from calib_core.synthetic.rig import RigOptions, random_rig
 
 __all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "exact_instruments", "options_of", "tape_measured"]
 

@@ -8,13 +8,14 @@ from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.figures import MET, MISSED, Measured, at_least, at_most, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from benchmarks.accuracy.scenes import PLACEMENTS, SCANS, Scene, draw_windows
+from benchmarks.simulated_pairs import AISLE
 from calib_core.calibration import calibrate
 from calib_core.options import CalibrationOptions
 from calib_core.paper.algorithm_1 import pair_as_printed, static_returns_as_printed
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration
-from calib_core.synthetic import AISLE, Rig
 from calib_core.synthetic.radar_returns import RadarProfile
+from calib_core.synthetic.rig import Rig
 
 __all__ = ["ROWS", "SCENES", "measure_clutter", "section"]
 

@@ -9,7 +9,7 @@ from benchmarks.accuracy.efficiency import measure_ours
 from benchmarks.accuracy.figures import column, fewest, joined, share, summed_up, within
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from benchmarks.accuracy.smooth import SMOOTH_COUNTS, smooth_key
-from calib_core.synthetic.simulated_pairs import NoiseName
+from benchmarks.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "section"]
 

@@ -18,9 +18,9 @@ from benchmarks.accuracy.figures import (
 )
 from benchmarks.accuracy.methods import NOT_RUN, PEERS, available, solve_ours
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.geometry import RigidTransform
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs
 
 __all__ = ["PEER_ROWS", "ROWS", "errors_of", "failed", "inside", "measure_ours", "peer_section", "section"]
 

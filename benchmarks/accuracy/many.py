@@ -9,8 +9,8 @@ from benchmarks.accuracy.efficiency import errors_of, failed
 from benchmarks.accuracy.figures import at_most, column, fewest, ratio, summed_up
 from benchmarks.accuracy.methods import solve_ours, sqpnp_lm
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.geometry import RigidTransform
-from calib_core.synthetic import SimulatedPairs
 
 __all__ = ["ROWS", "measure_many", "section"]
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from benchmarks.accuracy.cases import Case, options_of
 from benchmarks.accuracy.reproduced import bias_compensated_pnp, gmlpnp
+from benchmarks.simulated_pairs import NOISE_PROFILES, SimulatedPairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
 from calib_core.paper.pnp import refine_lm, solve_pnp
 from calib_core.radar import sigma_polar_of
 from calib_core.results import Calibration
-from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs
 
 __all__ = ["NOT_RUN", "PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
 

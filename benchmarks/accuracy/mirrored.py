@@ -9,12 +9,11 @@ import numpy as np
 from benchmarks.accuracy.cases import Case, draw, tape_measured
 from benchmarks.accuracy.figures import MET, MISSED, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, SimulatedPairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "Mirrored", "measure_mirrored", "section"]
 

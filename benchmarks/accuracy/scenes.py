@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.simulated_pairs import FIELD, draw_positions, study_camera
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import FIELD, RADAR_PROFILES, PairsLayout, Rig, random_rig
 from calib_core.synthetic.options import RadarName
-from calib_core.synthetic.radar_returns import RadarProfile, Targets, measure
-from calib_core.synthetic.simulated_pairs import draw_positions, study_camera
+from calib_core.synthetic.radar_returns import RADAR_PROFILES, RadarProfile, Targets, measure
+from calib_core.synthetic.rig import Rig, random_rig
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = ["PLACEMENTS", "SCANS", "Scene", "Windows", "draw_windows"]
 

@@ -11,13 +11,13 @@ from benchmarks.accuracy.efficiency import errors_of, inside
 from benchmarks.accuracy.figures import Measured, at_most, column, fewest, summed_up
 from benchmarks.accuracy.methods import as_printed, best_threshold_px
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 
 __all__ = ["ROWS", "SMOOTH_COUNTS", "measure_smooth", "section", "smooth_key"]
 

@@ -12,6 +12,7 @@ from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.defects.adversaries import draw_flat
 from benchmarks.accuracy.figures import at_least, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import FIELD, NoiseName, SimulatedPairs, draw_systematic_errors, simulate_pairs
 from calib_core.arrays import Points2, Points3
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.geometry import RigidTransform
@@ -20,9 +21,9 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
-from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, simulate, simulate_pairs
 from calib_core.synthetic.presets import PRESETS, PresetName
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
+from calib_core.synthetic.recording import simulate
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = ["ROWS", "Verdicts", "measure_recording", "measure_verdict", "section", "share_inside"]
 

@@ -10,8 +10,8 @@ from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics.board import Board
 from calib_core.measurements import TimeNs
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
+from calib_core.synthetic.rig import typical_camera
 
 __all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Images", "Series", "drawn_camera", "drawn_series", "moved"]
 

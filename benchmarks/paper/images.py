@@ -27,8 +27,9 @@ from calib_core.evaluation.figures import BoxFigures
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Box, TimeNs
 from calib_core.results import Calibration
-from calib_core.synthetic import PresetName, SimulatedRecording, simulate
 from calib_core.synthetic.annotations import true_boxes
+from calib_core.synthetic.presets import PresetName
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 
 _STYLE = (
     "<style>text{font:15px sans-serif;fill:#222}.title{font-size:18px;font-weight:bold}.axis{stroke:#444;fill:none}"

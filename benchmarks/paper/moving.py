@@ -14,8 +14,9 @@ from calib_core.evaluation.figures import BoxFigures
 from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels, TimeNs
-from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
+from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 
 MOVING: Mapping[PresetName, tuple[str, str]] = {
     "people": ("people walking on the rooftop", "89 %"),

@@ -14,7 +14,7 @@ from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import aed, cdsd, distances
-from calib_core.synthetic import SimulatedRecording
+from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rig import OTHER_OFFSET_M, OTHER_YAW_DEG
 
 MOST_GROSS = 4

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from calib_core.options import CalibrationOptions, PaperOptions
-from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, SimulationOptions, simulate
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 
 Dataset: TypeAlias = Literal["d1", "d2", "d3"]
 SEED_SETS: Sequence[Sequence[int]] = (range(401, 421), range(421, 441))

@@ -16,7 +16,7 @@ from benchmarks.proposing.square_reflector import with_square_reflectors
 from calib_core.errors import OptionError
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import dwell_views, proposals_of
-from calib_core.synthetic import simulate
+from calib_core.synthetic.recording import simulate
 
 __all__ = ["measure_case", "measure_drawn", "measure_square"]
 

@@ -10,8 +10,8 @@ from benchmarks.speed.rows import Row, Table
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_search import search_boards
 from calib_core.measurements import TimeNs
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
+from calib_core.synthetic.rig import typical_camera
 
 __all__ = ["measure_board_search"]
 

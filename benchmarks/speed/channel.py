@@ -9,10 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from benchmarks.speed.rows import Row, Table, section
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.measurements import ReflectorClick, TimeNs
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from cocalib.session.applying import History
 from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.build import view

@@ -19,7 +19,9 @@ from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.speed.rows import Row, Table, section
 from benchmarks.speed.starting import as_installed
-from calib_core.synthetic import SimulationOptions, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 from cocalib.platform.resources import sample_folder
 from tests.find_browser import find_browser
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from benchmarks.accuracy.cases import Case
 from benchmarks.accuracy.methods import PEERS, available
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from benchmarks.speed.rows import Row, Table
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.measurements import Pair
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 
 __all__ = ["measure_solving"]
 

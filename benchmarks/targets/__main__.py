@@ -14,8 +14,9 @@ from calib_core.evaluation.box_acc import judged_by_boxes
 from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
 from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.synthetic import SimulationOptions, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 
 __all__ = ["main"]
 

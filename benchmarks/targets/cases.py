@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from calib_core.synthetic import PRESETS, RigOptions, SimulationOptions
-from calib_core.synthetic.options import Surroundings
+from calib_core.synthetic.options import SimulationOptions, Surroundings
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.rig import RigOptions
 
 __all__ = ["CASES"]
 

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 
 import cocalib as cc
-from calib_core.synthetic import SimulationOptions, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 
 size = {
     "width_px": 320,

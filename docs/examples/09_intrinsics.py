@@ -7,8 +7,8 @@ from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_images import BoardCorners
 from calib_core.intrinsics.calibrating import calibrate_lens
 from calib_core.intrinsics.coverage import BoardSearch
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
+from calib_core.synthetic.rig import typical_camera
 
 # From images, `cocalib intrinsics left*.jpg --board 9x6 --square-mm 25 --out camera.yaml` finds the corners first; in Python
 # calib_core.intrinsics.search_boards does. Here the corners are simulated, so the true lens is known.

@@ -8,9 +8,9 @@ import pytest
 from benchmarks.accuracy.cases import Case, draw
 from benchmarks.accuracy.methods import NOT_RUN, PEERS, sqpnp_lm
 from benchmarks.accuracy.reproduced import bias_compensated_pnp, gmlpnp, unbiased_positions
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
 EXACT = [simulate_pairs(20, rng=np.random.default_rng(seed), noise="none") for seed in range(3)]
 

@@ -15,10 +15,10 @@ from benchmarks.accuracy.defects.shared_errors import Shared, draw_shared, measu
 from benchmarks.accuracy.defects.two_reflectors import measure_returns, measure_two
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong, solved_or_refused
 from benchmarks.accuracy.rows import Figures
+from benchmarks.simulated_pairs import SystematicErrors
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
-from calib_core.synthetic import SystematicErrors
 
 _SLOW = {"heavy-aisle"}
 _WITHOUT_POSE = {"degenerate-placements", "no-pose", "too-few-pairs"}

@@ -41,7 +41,7 @@ def test_a_verdict_needs_no_optimizer_of_scipy():
     code = (
         "import sys\nfrom dataclasses import replace\nimport numpy as np\n"
         "from calib_core.calibration import calibrate_pairs\nfrom calib_core.results.verdict import stated_error\n"
-        "from calib_core.synthetic import simulate_pairs\n"
+        "from benchmarks.simulated_pairs import simulate_pairs\n"
         "drawn = simulate_pairs(8, rng=np.random.default_rng(1))\n"
         "answer = calibrate_pairs(drawn.pairs, drawn.camera).unwrap()\n"
         "stated_error(replace(answer, covariance_quantile=20.0))\nprint('scipy.optimize' in sys.modules)"
@@ -59,7 +59,7 @@ def test_session_and_view_import_nothing_heavy():
     [
         "calib_core.interchange.importing",
         "calib_core.interchange.exporting",
-        "calib_core.synthetic",
+        "calib_core.synthetic.recording",
         "calib_core.recordings",
     ],
 )

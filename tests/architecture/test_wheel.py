@@ -20,8 +20,8 @@ import pytest
 
 from benchmarks.boards import render_board
 from calib_core.intrinsics.board import Board
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
+from calib_core.synthetic.rig import typical_camera
 from tests.architecture.test_named_commands import command_lines
 from tests.port_client import channel, come_in, wanted
 from tests.served_process import ServedProcess

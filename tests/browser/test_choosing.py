@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
-from calib_core.synthetic import PRESETS, SimulationOptions, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import simulate
 from tests.browser.driving import Driver
 from tests.image_recording import grey_frames
 from tests.served_process import ServedProcess, served_process

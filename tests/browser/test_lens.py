@@ -15,7 +15,9 @@ from playwright.sync_api import expect
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
-from calib_core.synthetic import PRESETS, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import simulate
 from cocalib.intrinsics import RecordedImages
 from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import zscore
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs, study_camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.measurements import (
     NS_PER_S,
@@ -42,8 +43,6 @@ from calib_core.results import Calibration
 from calib_core.results.actions import SetOption
 from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import study_camera
 from calib_core.words.outcomes import outcome_told
 from calib_core.words.text import OptionPart
 

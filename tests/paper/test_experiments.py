@@ -13,7 +13,8 @@ from benchmarks.paper.judgement import PAPER, Judged, differing, judged, row_jud
 from benchmarks.paper.page import MEASURED_FILE, page, read_measured
 from benchmarks.paper.rows import Figures, Seed, calibrated, displaced, measured_pairs, with_gross_errors
 from benchmarks.paper.settings import FIT_SEEDS, FITTED, PPM, SEED_SETS, Dataset, options_of, other_rig, session
-from calib_core.synthetic import SimulatedRecording, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from cocalib.cli import run as cocalib
 
 SMALL = dataclasses.replace(FITTED, width_px=480, placements=5, board_corners=5)

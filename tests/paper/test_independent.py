@@ -9,7 +9,7 @@ import pytest
 from benchmarks.paper.rows import Figures, by_checkerboard, calibrated, figures_of, measure, points_and_pixels
 from benchmarks.paper.settings import FITTED, SEED_SETS, Dataset, session
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedRecording
+from calib_core.synthetic.recording import SimulatedRecording
 
 Point = Sequence[float]
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs, study_camera
 from calib_core.camera import CAMERA_MODELS, Camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
-from calib_core.synthetic import SimulatedPairs, simulate_pairs, typical_camera
-from calib_core.synthetic.simulated_pairs import study_camera
+from calib_core.synthetic.rig import typical_camera
 
 SOLVERS: tuple[PnPSolver, ...] = ("iterative", "sqpnp")
 

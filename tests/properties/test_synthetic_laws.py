@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.measurements import TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import RADAR_PROFILES, simulate_pairs
-from calib_core.synthetic.radar_returns import Targets, measure
+from calib_core.synthetic.radar_returns import RADAR_PROFILES, Targets, measure
 from calib_core.synthetic.rendering.surfaces import line_coverage
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.timeline import draw_islands, draw_times

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.measurements import MIN_PAIRS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate, simulate_pairs
 from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calib_core.camera import CAMERA_MODELS, Camera, CameraCovariance
-from calib_core.synthetic import typical_camera
+from calib_core.synthetic.rig import typical_camera
 
 MATRIX_PX = np.array([[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]])
 

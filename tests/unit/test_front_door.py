@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import calib_core as cc
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.measurements import TimeNs
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
 
 @pytest.fixture(scope="module")

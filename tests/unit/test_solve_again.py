@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
 from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 from tests.rooftop import read_rooftop
 

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import tyro
 
-from calib_core.synthetic import PRESETS, PresetName, SimulationOptions
-from calib_core.synthetic.options import Container
+from calib_core.synthetic.options import Container, SimulationOptions
+from calib_core.synthetic.presets import PRESETS, PresetName
 from cocalib.cli.flags import OUTPUT_FOLDER, File
 from cocalib.cli.named_options import Settings, with_named
 from cocalib.cli.output import progress_bar
@@ -33,8 +33,8 @@ class Simulate:
 
     def run(self) -> int:
         """Write the recording; return the exit code."""
-        from calib_core.synthetic import simulate, write_recording
-        from calib_core.synthetic.files import images_size_bytes
+        from calib_core.synthetic.files import images_size_bytes, write_recording
+        from calib_core.synthetic.recording import simulate
 
         recording = simulate(with_named(PRESETS[self.preset], self.set, self.options))
         with whole_folder(self.out) as part:

@@ -9,14 +9,22 @@ import numpy as np
 from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.defects.pair_defects import draw_flat_radar_rig, random_rig_apart
 from benchmarks.accuracy.outcomes import solved_or_refused
+from benchmarks.simulated_pairs import (
+    FIELD,
+    NoiseName,
+    SimulatedPairs,
+    SystematicErrors,
+    draw_systematic_errors,
+    simulate_pairs,
+    study_camera,
+)
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import FIELD, PairsLayout, Rig, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.rig import random_rig
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
+from calib_core.synthetic.rig import Rig, random_rig
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = ["FLAT", "Adversary", "Change", "Draw", "Solved", "draw_flat", "generator"]
 

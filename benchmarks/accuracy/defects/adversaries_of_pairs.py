@@ -19,10 +19,10 @@ from benchmarks.accuracy.defects.pair_defects import (
     with_sheared_array,
     with_zero_pair,
 )
+from benchmarks.simulated_pairs import AISLE, NoiseName, SimulatedPairs, SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, CameraPositionPrior
-from calib_core.synthetic import AISLE, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = ["ADVERSARIES_OF_PAIRS"]
 

@@ -8,7 +8,8 @@ from benchmarks.accuracy.scenes import Scene, draw_windows
 from calib_core.calibration import calibrate
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.synthetic import SimulationOptions, simulate
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 
 __all__ = ["ADVERSARIES_OF_SCANS"]
 

@@ -11,10 +11,9 @@ from benchmarks.accuracy.defects.shared_errors import Shared, draw_shared, measu
 from benchmarks.accuracy.figures import MET, UNDECIDED, Measured, at_most, share, worst
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, SystematicErrors, draw_systematic_errors, simulate_pairs, study_camera
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
-from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, SystematicErrors, draw_systematic_errors, study_camera
 
 __all__ = ["HANDEDNESS_CODES", "ROWS", "measure_apart", "measure_clean_draw", "section"]
 

@@ -10,11 +10,10 @@ import numpy as np
 from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.figures import MET, MISSED, at_most, column, share
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "measure_drag", "section"]
 

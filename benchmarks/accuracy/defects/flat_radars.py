@@ -11,11 +11,10 @@ from benchmarks.accuracy.defects.adversaries import draw_flat
 from benchmarks.accuracy.figures import Measured, at_most, column, fewest, share, summed_up
 from benchmarks.accuracy.outcomes import outcome_figures
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, SimulatedPairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "measure_flat", "section"]
 

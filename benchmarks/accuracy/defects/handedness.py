@@ -12,10 +12,10 @@ from benchmarks.accuracy.defects.pair_defects import clicked_again, mirrored, ra
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, solved_or_refused
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, draw_systematic_errors, simulate_pairs, study_camera
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, SolvingOptions
-from calib_core.synthetic import Rig, random_rig, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
+from calib_core.synthetic.rig import Rig, random_rig
 
 __all__ = ["ROWS", "Hand", "measure_hand", "section"]
 

@@ -10,14 +10,13 @@ import numpy as np
 from benchmarks.accuracy.figures import at_least, column, share
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, SimulatedPairs, draw_systematic_errors, simulate_pairs, study_camera
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, HowMeasured, SolvingOptions
 from calib_core.results.verdict import stated_error, verdict_on
-from calib_core.synthetic import Rig, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.rig import random_rig
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
+from calib_core.synthetic.rig import Rig, RigOptions, random_rig
 
 __all__ = ["ROWS", "measure", "section"]
 

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.arrays import Flags, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -16,7 +17,6 @@ from calib_core.measurements import Candidate, Pair
 from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines, polar_from_cartesian
 from calib_core.synthetic.rig import Rig, RigOptions, radar_stand
-from calib_core.synthetic.simulated_pairs import SimulatedPairs
 
 
 def clicked_again(

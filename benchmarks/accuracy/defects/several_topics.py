@@ -19,10 +19,11 @@ from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import RecordedMessage, write_ros1_bag
 from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedRecording, SimulationOptions, Surroundings, simulate
 from calib_core.synthetic.files import CLOUD_TOPIC, TRANSFER_NS, cloud_message, radar_messages
+from calib_core.synthetic.options import SimulationOptions, Surroundings
 from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.radar_returns import Antenna
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.scans import with_wrong_azimuths
 
 __all__ = ["CASES", "ROWS", "measure_topics", "section"]

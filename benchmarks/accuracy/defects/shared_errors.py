@@ -13,10 +13,17 @@ from benchmarks.accuracy.cases import exact_instruments, tape_measured
 from benchmarks.accuracy.figures import Measured, at_most, column, fewest, joined, ratio, share, summed_up, within
 from benchmarks.accuracy.outcomes import outcome_figures
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import (
+    FIELD,
+    NoiseName,
+    SimulatedPairs,
+    SystematicErrors,
+    draw_systematic_errors,
+    simulate_pairs,
+)
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
-from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = [
     "CLEAN_ROWS",

@@ -17,9 +17,9 @@ from calib_core.radar import direction_cosines
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import write_ros1_bag
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate
 from calib_core.synthetic.files import radar_messages
 from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 __all__ = ["RETURN_ROWS", "ROWS", "measure_returns", "measure_two", "returns_section", "section"]

@@ -11,12 +11,11 @@ from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.figures import at_most, column, fewest, joined, ratio, share, summed_up, within
 from benchmarks.accuracy.outcomes import outcome_figures
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from benchmarks.simulated_pairs import NoiseName, SimulatedPairs, draw_systematic_errors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, LensOptions, RadarOptions, RefiningOptions
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
 __all__ = ["ROWS", "WrongLens", "board_covariance", "draw_wrong_lens", "measure_wrong_lens", "section"]
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.synthetic.options import SceneName
-from calib_core.synthetic.simulated_pairs import PairsLayout
 
 USUAL_EDGE_M = 0.16
 """Length of the three edges that meet at the apex of the usual reflector [m]."""
@@ -95,6 +94,28 @@ class Board:
         across_m = places_m[:, 1] * self.x_m / np.maximum(places_m[:, 0], 1e-9)
         beside_m = np.maximum(self.y_m - across_m, across_m - self.y_m - self.square_m * (self.columns + 1))
         return np.asarray((places_m[:, 0] > self.x_m - 0.5) & (beside_m < 0.6))
+
+
+@dataclass(frozen=True, slots=True)
+class PairsLayout:
+    """Where the reflector is put, in the world."""
+
+    min_range_m: float = 2.0
+    """Nearest placement [m]."""
+    max_range_m: float = 20.0
+    """Farthest placement [m]."""
+    max_azimuth_deg: float = 35.0
+    """Largest bearing to either side [deg]."""
+    max_lateral_m: float = 100.0
+    """Largest distance from the radar's axis [m]; an aisle is narrow."""
+    height_m: float = 0.025
+    """Height of the reflector's phase centre above the ground [m]."""
+    roughness_m: float = 0.01
+    """Standard deviation of the ground's height [m]."""
+    max_height_m: float = 0.0
+    """If above 0, heights are uniform from height_m up to this, as on a tripod [m]."""
+    separation_m: float = 0.35
+    """Smallest distance between two placements [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,10 @@ from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
 from calib_core.synthetic.radar_returns import Antenna, RadarProfile, antennas_of, profile_with, radar_from_reported
 from calib_core.synthetic.rig import OTHER_OFFSET_M, OTHER_YAW_DEG, Rig, random_rig, typical_camera
 from calib_core.synthetic.scene.person import PersonState, capsules
-from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, Scatterer, Scene, scene_named
+from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, PairsLayout, Scatterer, Scene, scene_named
 from calib_core.synthetic.scene.story import Resting, Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
 from calib_core.synthetic.scene.traffic import VehicleState, draw_movers, draw_passers_by, hidden_by
-from calib_core.synthetic.simulated_pairs import PairsLayout, draw_positions
 from calib_core.synthetic.timeline import EVERYTHING, START_NS, Islands, SensorTimes, draw_islands, draw_times
 
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
@@ -197,6 +196,32 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
         if len(found) == options.placements:
             return np.concatenate([np.array(found).reshape(-1, 3), _board_places(rng, scene, rig, options)])
     raise OptionError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}; ask for fewer")
+
+
+def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: PairsLayout) -> Points3:
+    """Draw reflector positions (count, 3) in the radar frame that the camera sees, apart from one another.
+
+    Raises:
+        OptionError: they do not all fit in the layout.
+    """
+    found: list[np.ndarray] = []
+    for _ in range(2000 * count):
+        if len(found) == count:
+            break
+        range_m = rng.uniform(layout.min_range_m, layout.max_range_m)
+        azimuth_rad = np.deg2rad(rng.uniform(-layout.max_azimuth_deg, layout.max_azimuth_deg))
+        if layout.max_lateral_m < 50.0:  # narrow: spread over the width instead of the angle
+            azimuth_rad = np.arcsin(min(1.0, layout.max_lateral_m / range_m)) * rng.uniform(-1.0, 1.0)
+        height_m = layout.height_m + layout.roughness_m * rng.standard_normal()
+        height_m += rng.uniform(0.0, 1.0) * max(0.0, layout.max_height_m - layout.height_m)
+        world = np.array([range_m * np.cos(azimuth_rad), range_m * np.sin(azimuth_rad), height_m])
+        point = (rig.radar_from_world @ world[None])[0]
+        apart = all(np.linalg.norm(point - other) >= layout.separation_m for other in found)
+        if apart and bool(rig.camera.sees(rig.camera_from_radar @ point[None])[0]):
+            found.append(point)
+    if len(found) < count:
+        raise OptionError(f"only {len(found)} of {count} placements fit, {layout.separation_m} m apart and in view")
+    return np.array(found).reshape(-1, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,8 @@ from calib_core.options import (
     checked_options,
 )
 from calib_core.recordings import RecordingOptions
-from calib_core.synthetic import RigOptions, SimulationOptions
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.rig import RigOptions
 from cocalib import option_changes
 from cocalib.option_changes import (
     OptionChange,

@@ -17,8 +17,7 @@ from calib_core.association.clustering import (
 from calib_core.association.pairing import scores_of
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
-from calib_core.synthetic import RADAR_PROFILES
-from calib_core.synthetic.radar_returns import RadarProfile, Targets, measure
+from calib_core.synthetic.radar_returns import RADAR_PROFILES, RadarProfile, Targets, measure
 from tests.scans import scan_of
 
 REFLECTOR = (8.0, 1.0, -1.0)

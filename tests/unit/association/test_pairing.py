@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.accuracy.clutter import SCENES
 from benchmarks.accuracy.scenes import Windows, draw_windows
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.association.clustering import candidate_at, candidates_of, clusters_of, window_around
 from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
 from calib_core.association.gating import static_returns
@@ -31,7 +32,6 @@ from calib_core.measurements import (
 )
 from calib_core.options import CalibrationOptions, GatingOptions, LocatingOptions, NoiseOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
 from tests.scans import scan_of
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.association.clustering import clusters_of
 from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
 from calib_core.association.gating import static_returns
@@ -17,7 +18,6 @@ from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScan, RadarS
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.scans import scan_of
 
 OPTIONS = CalibrationOptions()

@@ -11,8 +11,8 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, time_from_part
 from calib_core.options import GatingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings import open_recording
-from calib_core.synthetic import simulate
 from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.scene.stage import SimulatedPlacement
 from tests.scans import scan_of
 

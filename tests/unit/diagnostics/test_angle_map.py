@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.arrays import Points3
 from calib_core.calibration import calibrate_pairs
 from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 
 LAYOUT = replace(FIELD, separation_m=0.05)
 OWN = NoiseOptions(2.0, 0.008, 0.1, 0.25)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import calib_core.calibration
+from benchmarks.simulated_pairs import FIELD, NOISE_PROFILES, NoiseName, SimulatedPairs, simulate_pairs, study_camera
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.camera import Camera
@@ -26,9 +27,7 @@ from calib_core.options import (
 from calib_core.results import Calibration, DataWarning, PairResult
 from calib_core.results.actions import ChooseReturn, MeasureCameraPosition, ReviewPairs, SetOption
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.rig import random_rig
-from calib_core.synthetic.simulated_pairs import NOISE_PROFILES, NoiseName, study_camera
+from calib_core.synthetic.rig import RigOptions, random_rig
 from calib_core.words.warnings import told
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.scans import scan_of

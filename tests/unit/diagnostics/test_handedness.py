@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
-from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.rig import RigOptions
 
 HANDEDNESS = {"mirrored-axes", "handedness-open", "handedness-assumed"}
 ANYWHERE = CalibrationOptions(solving=SolvingOptions(sensors_above_placements=False))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -12,7 +13,7 @@ from calib_core.measurements import NS_PER_S, Facts, Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RadarOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning
-from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.rig import RigOptions
 
 EXACT_RADAR = RadarOptions(
     azimuth_scale_sigma=0.0, elevation_scale_sigma=0.0, range_bias_sigma_m=0.0, range_scale_sigma=0.0

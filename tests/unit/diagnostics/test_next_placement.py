@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import NOISE_PROFILES, SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.diagnostics.next_placement import (
     ENOUGH_PLACEMENTS,
@@ -17,7 +18,6 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration
-from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs, simulate_pairs
 
 OPTIONS = CalibrationOptions(noise=NoiseOptions(2.0, 0.015, 0.55, 1.0))
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.diagnostics.uncertainty_map import pixel_quantile, uncertainty_map
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
 
 _CHI2_95_2D, _CHI2_95_6D = 5.991464547107979, 12.591587243743977
 
@@ -68,7 +68,7 @@ def test_a_method_without_noise_model_has_no_map(solved):
 
 
 def test_a_radar_without_elevation_is_mapped_by_what_its_pairs_determine():
-    from calib_core.synthetic import SystematicErrors
+    from benchmarks.simulated_pairs import SystematicErrors
 
     drawn = simulate_pairs(20, rng=np.random.default_rng(5), systematic=SystematicErrors(measures_elevation=False))
     flat = calibrate_pairs(drawn.pairs, drawn.camera).unwrap()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.measurements import Pair
@@ -21,7 +22,6 @@ from calib_core.options import (
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.results.calibration import CovarianceParts
-from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 EXACT = without_systematic_errors(MEASURED)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.estimation.gnc import associate, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import Hypotheses, hypothesis_costs, initial_poses
@@ -13,7 +14,7 @@ from calib_core.geometry import rotation_angle_rad
 from calib_core.measurements import Candidate, Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
-from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.rig import RigOptions
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 

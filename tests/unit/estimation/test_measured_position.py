@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, draw_systematic_errors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import HOW_MEASURED, CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
-from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import draw_systematic_errors
+from calib_core.synthetic.rig import RigOptions
 
 CONTRADICTED = "camera-position-contradicted"
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
@@ -22,7 +23,7 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
-from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.rig import RigOptions
 
 
 def simulated(decoys: int = 0) -> tuple[SimulatedPairs, PairMeasurements]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.estimation.beyond_the_fit import find_pivotal_pair
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
@@ -17,7 +18,6 @@ from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.solved_draws import solve_draw
 

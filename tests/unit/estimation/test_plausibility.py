@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.measurements import Candidate, Facts, Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, Method, SolvingOptions
-from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.rig import RigOptions
 
 SUSPECTED = {"units-suspected", "pixels-suspected", "radar-axes-suspected"}
 RIG = RigOptions(camera_offset_m=(0.0, 0.5, 0.1))

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import NoiseName, SystematicErrors, draw_systematic_errors, simulate_pairs, study_camera
 from calib_core.calibration import preview_pairs
 from calib_core.estimation.pose_change import AXES, PoseChange, pose_change
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import Rig, SystematicErrors, draw_systematic_errors, random_rig, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, study_camera
+from calib_core.synthetic.rig import Rig, random_rig
 
 PAIRS = 24
 

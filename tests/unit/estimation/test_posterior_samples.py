@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.arrays import Values
 from calib_core.estimation import posterior_samples as samples
 from calib_core.estimation.beyond_the_fit import (
@@ -26,7 +27,6 @@ from calib_core.estimation.posterior_samples import (
 )
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.solved_draws import NARROW, SolvedDraw, solve_draw
 
 

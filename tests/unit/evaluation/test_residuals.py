@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -18,7 +19,6 @@ from calib_core.measurements import NS_PER_S, Pair, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
 from calib_core.results.metrics import metrics_of
-from calib_core.synthetic import simulate_pairs
 from tests.street import CAMERA, OPTICAL_FROM_RADAR, TRUE_POSE, street, turned
 
 PINHOLE = Camera("pinhole", 200, 100, np.array([[100.0, 0.0, 100.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]]))

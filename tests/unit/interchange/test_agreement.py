@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import preview_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -27,7 +28,7 @@ from calib_core.interchange.formats.registry import FORMATS, format_named
 from calib_core.interchange.importing import adopt, read_any
 from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.interchange.syntax.zip_archives import pack, unpack
-from calib_core.synthetic import random_rig, simulate_pairs
+from calib_core.synthetic.rig import random_rig
 
 
 def moved(file: CalibrationFile, *error: float) -> CalibrationFile:

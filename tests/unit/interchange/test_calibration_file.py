@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import calib_core as cc
+from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import (
@@ -42,7 +43,6 @@ from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOpt
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import SystematicErrors, simulate_pairs
 from calib_core.words.verdict import stated_verdict
 
 

@@ -20,7 +20,7 @@ from calib_core.interchange.cameras.files import (
     read_camera,
     read_camera_file,
 )
-from calib_core.synthetic import typical_camera
+from calib_core.synthetic.rig import typical_camera
 
 K = [[500.5, 0.0, 320.25], [0.0, 501.5, 240.75], [0.0, 0.0, 1.0]]
 D = [-0.3, 0.1, 0.001, -0.002, 0.01]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -26,7 +27,6 @@ from calib_core.interchange.own.calibration_json import calibration_file, write_
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
-from calib_core.synthetic import simulate_pairs
 
 
 def text_of(file: CalibrationFile, name: str) -> str:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs, solve_again
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames, Provenance, choose_check_point
@@ -27,7 +28,6 @@ from calib_core.intrinsics.board_images import BoardCorners
 from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, UnconfirmedClicks
-from calib_core.synthetic import simulate_pairs
 
 CAMERA = {"model": "pinhole", "width_px": 640, "height_px": 480, "matrix_px": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
 

@@ -18,8 +18,8 @@ from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
 from calib_core.intrinsics.board_search import ImageOrder, search_boards
 from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import TimeNs, Unsolvable
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import waved_poses
+from calib_core.synthetic.rig import typical_camera
 
 BOARD = Board("checkerboard", 5, 4, 0.03)
 

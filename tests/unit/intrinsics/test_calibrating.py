@@ -15,7 +15,7 @@ from calib_core.intrinsics.coverage import Coverage, view_coverage
 from calib_core.intrinsics.image_maps import far_point_slopes, projection_uncertainty, residual_field
 from calib_core.intrinsics.split_difference import split_difference
 from calib_core.measurements import Unsolvable
-from calib_core.synthetic import typical_camera
+from calib_core.synthetic.rig import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of
 
 PINHOLE = "pinhole"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -23,7 +24,10 @@ from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.paper.pnp import solve_pnp_ransac
 from calib_core.recordings import open_recording
-from calib_core.synthetic import SimulationOptions, simulate, simulate_pairs, typical_camera, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
+from calib_core.synthetic.rig import typical_camera
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 

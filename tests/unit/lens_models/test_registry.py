@@ -11,7 +11,8 @@ from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.brown_conrady import PLUMB_BOB
 from calib_core.lens_models.lens_model import TypicalLens
 from calib_core.lens_models.registry import LENS_MODELS, lenses_named, names_in, opencv_lens, written_lens
-from calib_core.synthetic import SimulationOptions, typical_camera
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.rig import typical_camera
 
 LENSES = list(LENS_MODELS.values())
 each_lens = pytest.mark.parametrize("lens", LENSES, ids=list(LENS_MODELS))

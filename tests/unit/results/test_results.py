@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError, OptionError, UnsolvableError
@@ -12,7 +13,6 @@ from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import acc, aed, cdsd, inside_boxes, metrics_of, rms
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from calib_core.words.outcomes import said_of
 
 POINT = np.array([[8.0, 0.5, 0.0]])

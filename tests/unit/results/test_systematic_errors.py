@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, SystematicErrors, simulate_pairs, study_camera
 from calib_core.arrays import Points3
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera, CameraCovariance
@@ -36,14 +37,7 @@ from calib_core.results.systematic_errors import (
     shared_out,
     systematic_errors,
 )
-from calib_core.synthetic import (
-    FIELD,
-    RigOptions,
-    SimulatedPairs,
-    SystematicErrors,
-    simulate_pairs,
-)
-from calib_core.synthetic.simulated_pairs import study_camera
+from calib_core.synthetic.rig import RigOptions
 from calib_core.words.systematic_errors import ERRORS, dominant_sentence, error_words, remedy_of
 
 FREE = CalibrationOptions()

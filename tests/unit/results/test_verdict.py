@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
@@ -21,7 +22,6 @@ from calib_core.results.actions import (
     SetOption,
 )
 from calib_core.results.verdict import by_consequence, stated_error, verdict_on
-from calib_core.synthetic import simulate_pairs
 
 FEW = Unsolvable.reported("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
 

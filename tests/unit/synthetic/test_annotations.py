@@ -8,9 +8,11 @@ import pytest
 
 from calib_core.measurements import NS_PER_S, Box
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, Surroundings, simulate, write_recording
 from calib_core.synthetic.annotations import true_boxes, true_labels
-from calib_core.synthetic.options import Traffic
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions, Surroundings, Traffic
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.scene.traffic import ActorLabel, Mover
 
 WALK = SimulationOptions(

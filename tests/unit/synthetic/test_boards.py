@@ -11,8 +11,8 @@ from calib_core.camera import Camera, CameraModel
 from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log
 from calib_core.intrinsics.board import Board
-from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import grid_rays, waved_poses
+from calib_core.synthetic.rig import typical_camera
 
 BOARD = Board("checkerboard", 7, 5, 0.03)
 FINER = 4

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from calib_core.interchange.own.clicks_json import read_clicks
-from calib_core.synthetic import SimulatedRecording, SimulationOptions, simulate
 from calib_core.synthetic.files import clicks_text, truth_text
-from calib_core.synthetic.options import Clicking
+from calib_core.synthetic.options import Clicking, SimulationOptions
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 
 QUIET = SimulationOptions(
     scene="field",

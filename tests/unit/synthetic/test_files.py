@@ -19,8 +19,10 @@ from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
-from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, simulate, write_recording
-from calib_core.synthetic.recording import SimulatedFrame
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import OTHER_OFFSET_M
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)

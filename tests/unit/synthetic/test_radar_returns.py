@@ -10,7 +10,6 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar, direction_cosines, polar_from_cartesian
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, write_ros1_bag
-from calib_core.synthetic import RADAR_PROFILES, RadarDefects, SimulationOptions, simulate
 from calib_core.synthetic.files import (
     CLOUD_TOPIC,
     SECOND_COLUMN,
@@ -19,8 +18,9 @@ from calib_core.synthetic.files import (
     radar_messages,
     truth_text,
 )
-from calib_core.synthetic.options import IntrinsicsErrors
-from calib_core.synthetic.radar_returns import Targets, measure, radar_from_reported, second_azimuths
+from calib_core.synthetic.options import IntrinsicsErrors, RadarDefects, SimulationOptions
+from calib_core.synthetic.radar_returns import RADAR_PROFILES, Targets, measure, radar_from_reported, second_azimuths
+from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.rig import RigOptions, radar_stand
 
 QUIET = SimulationOptions(

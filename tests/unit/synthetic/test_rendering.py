@@ -7,11 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
-from calib_core.synthetic import Rig, SimulationOptions, random_rig, simulate, typical_camera
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import apex_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays, trace_still
 from calib_core.synthetic.rendering.surfaces import fractal_noise, line_coverage
+from calib_core.synthetic.rig import Rig, random_rig, typical_camera
 from calib_core.synthetic.scene.person import PersonState
 from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import Stage, set_stage

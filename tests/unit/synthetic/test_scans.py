@@ -8,8 +8,9 @@ import pytest
 from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import PRESETS, RadarDefects, SimulatedRecording, SimulationOptions, simulate
-from calib_core.synthetic.options import Traffic
+from calib_core.synthetic.options import RadarDefects, SimulationOptions, Traffic
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 
 SHORT = SimulationOptions(placements=4, dwell_s=5.0, seed=3)
 

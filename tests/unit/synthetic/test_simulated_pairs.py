@@ -18,22 +18,19 @@ from benchmarks.accuracy.defects.pair_defects import (
     with_rounded_elevations,
     with_zero_pair,
 )
-from calib_core.errors import OptionError
-from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
-from calib_core.radar import polar_from_cartesian, sigma_polar_of
-from calib_core.synthetic import (
+from benchmarks.simulated_pairs import (
     AISLE,
     NOISE_PROFILES,
-    PairsLayout,
-    RigOptions,
     SimulatedPairs,
     SystematicErrors,
     draw_systematic_errors,
-    random_rig,
     simulate_pairs,
-    typical_camera,
 )
-from calib_core.synthetic.rig import nominal_rotation
+from calib_core.errors import OptionError
+from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
+from calib_core.radar import polar_from_cartesian, sigma_polar_of
+from calib_core.synthetic.rig import RigOptions, nominal_rotation, random_rig, typical_camera
+from calib_core.synthetic.scene.scenes import PairsLayout
 
 
 def _radar_points(simulated: SimulatedPairs) -> np.ndarray:

@@ -14,12 +14,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import CalibrationError, InputError
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.results.verdict import stated_error
-from calib_core.synthetic.simulated_pairs import simulate_pairs
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, outcome_text

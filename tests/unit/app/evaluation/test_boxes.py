@@ -10,7 +10,7 @@ from calib_core.boxes import boxes_text, labels_text
 from calib_core.errors import InputError
 from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, RadarScans, ReturnLabels, TimeNs
 from calib_core.recordings import Recording, inspect_recording
-from calib_core.synthetic import typical_camera
+from calib_core.synthetic.rig import typical_camera
 from cocalib.evaluation.boxes import find_boxes, find_labels
 from cocalib.evaluation.evaluating import evidence_in
 from tests.unit.recordings.box_messages import FIRST_FRAME_NS, recorded

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from calib_core.synthetic import SimulationOptions, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
 from tests.image_recording import grey_frames
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import cocalib.solving.automatic as automatic_solving
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.association.placements import Placement
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -17,7 +18,6 @@ from calib_core.proposing import ImageCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import UnconfirmedClicks
 from calib_core.results.actions import MeasureCameraPosition
-from calib_core.synthetic import simulate_pairs
 from calib_core.words.outcomes import outcome_told
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
 from cocalib.session.events import Solved
 from cocalib.solving.worker import SolverWorker
 from tests.unit.app.solving.test_solving import CLICK, Radar

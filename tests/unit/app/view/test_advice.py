@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.actions import ReduceError
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import simulate_pairs
 from cocalib.view.build import advice_for
 from cocalib.view.model import Advice
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
-from calib_core.synthetic import simulate_pairs
 from cocalib.view.contours import contour_lines, contour_maps
 
 COLUMNS, ROWS = np.linspace(0.0, 60.0, 31), np.linspace(0.0, 40.0, 21)

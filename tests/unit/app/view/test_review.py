@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.check.report import check
 from calib_core.interchange.format import imported
 from calib_core.measurements import ChosenReturn, TimeNs
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from cocalib.session.applying import History, advance
 from cocalib.session.events import ClickPlaced, Solved
 from cocalib.session.state import RecordingFacts

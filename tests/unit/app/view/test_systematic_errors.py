@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.systematic_errors import SystematicErrorResult
-from calib_core.synthetic import simulate_pairs
 from cocalib.view.build import summary_lines
 from cocalib.view.figures import assumed_figures, firm_text, pose_figures, systematic_errors
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -13,7 +14,6 @@ from calib_core.measurements import Pair, Stamp, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
-from calib_core.synthetic import simulate_pairs
 from cocalib.session.applying import History, advance
 from cocalib.session.events import ClickExcluded, ClickMoved, ClickPlaced, Solved, Undo
 from cocalib.session.state import RecordingFacts

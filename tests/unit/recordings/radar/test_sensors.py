@@ -15,9 +15,9 @@ from calib_core.recordings import Recording, RecordingOptions, describe, open_re
 from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
 from calib_core.recordings.radar.merging import Spread, merged, moments_of, spread_of
 from calib_core.recordings.radar.sensors import sensor_name
-from calib_core.synthetic import simulate
 from calib_core.synthetic.files import SIDE_FRAME, SIDE_TOPIC, radar_messages
 from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import simulate
 from tests.scans import scan_of
 
 START_NS = 1_700_000_000 * NS_PER_S

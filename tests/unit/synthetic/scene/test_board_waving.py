@@ -12,7 +12,10 @@ import pytest
 from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import open_recording
-from calib_core.synthetic import PRESETS, SimulatedRecording, SimulationOptions, simulate, write_recording
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.presets import PRESETS
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.scene.stage import set_stage
 
 WAVED_S = 5.0

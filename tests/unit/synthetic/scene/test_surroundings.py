@@ -8,7 +8,8 @@ import pytest
 from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import SimulatedRecording, SimulationOptions, Surroundings, simulate
+from calib_core.synthetic.options import SimulationOptions, Surroundings
+from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import SimulatedPlacement, set_stage

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.interchange.own.raw_data import for_raw
 from calib_core.radar import AngleMap
-from calib_core.synthetic import SystematicErrors, simulate_pairs
 from cocalib.web.channel import export_preview as panel
 from cocalib.web.exports import format_rows
 

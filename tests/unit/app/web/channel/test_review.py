@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
 from cocalib.session.applying import History
 from cocalib.session.state import Session
 from cocalib.web.channel.outbox import Outbox

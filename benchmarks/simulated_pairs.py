@@ -16,12 +16,13 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3, Vector3, freeze
 from calib_core.camera import Camera
-from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import LensOptions, NoiseOptions, RadarOptions, ReflectorOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
+from calib_core.synthetic.scene.scenes import PairsLayout
+from calib_core.synthetic.scene.stage import draw_positions
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,28 +139,6 @@ NOISE_PROFILES: dict[NoiseName, NoiseOptions] = {
 """Assumed noise of radar families; "none" is exact, and its candidates have the "ti_fine" sigmas."""
 
 
-@dataclass(frozen=True, slots=True)
-class PairsLayout:
-    """Where the reflector is put, in the world."""
-
-    min_range_m: float = 2.0
-    """Nearest placement [m]."""
-    max_range_m: float = 20.0
-    """Farthest placement [m]."""
-    max_azimuth_deg: float = 35.0
-    """Largest bearing to either side [deg]."""
-    max_lateral_m: float = 100.0
-    """Largest distance from the radar's axis [m]; an aisle is narrow."""
-    height_m: float = 0.025
-    """Height of the reflector's phase centre above the ground [m]."""
-    roughness_m: float = 0.01
-    """Standard deviation of the ground's height [m]."""
-    max_height_m: float = 0.0
-    """If above 0, heights are uniform from height_m up to this, as on a tripod [m]."""
-    separation_m: float = 0.35
-    """Smallest distance between two placements [m]."""
-
-
 FIELD = PairsLayout()
 AISLE = PairsLayout(max_range_m=15.0, max_lateral_m=1.2)
 
@@ -264,32 +243,6 @@ def study_camera() -> Camera:
     matrix[:2, 2] = [959.5, 539.5]
     matrix[1, 1] = matrix[0, 0]
     return Camera("plumb_bob", 1920, 1080, matrix, np.array([-0.10, 0.02, 0.0, 0.0]))
-
-
-def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: PairsLayout) -> Points3:
-    """Draw reflector positions (count, 3) in the radar frame that the camera sees, apart from one another.
-
-    Raises:
-        OptionError: they do not all fit in the layout.
-    """
-    found: list[np.ndarray] = []
-    for _ in range(2000 * count):
-        if len(found) == count:
-            break
-        range_m = rng.uniform(layout.min_range_m, layout.max_range_m)
-        azimuth_rad = np.deg2rad(rng.uniform(-layout.max_azimuth_deg, layout.max_azimuth_deg))
-        if layout.max_lateral_m < 50.0:  # narrow: spread over the width instead of the angle
-            azimuth_rad = np.arcsin(min(1.0, layout.max_lateral_m / range_m)) * rng.uniform(-1.0, 1.0)
-        height_m = layout.height_m + layout.roughness_m * rng.standard_normal()
-        height_m += rng.uniform(0.0, 1.0) * max(0.0, layout.max_height_m - layout.height_m)
-        world = np.array([range_m * np.cos(azimuth_rad), range_m * np.sin(azimuth_rad), height_m])
-        point = (rig.radar_from_world @ world[None])[0]
-        apart = all(np.linalg.norm(point - other) >= layout.separation_m for other in found)
-        if apart and bool(rig.camera.sees(rig.camera_from_radar @ point[None])[0]):
-            found.append(point)
-    if len(found) < count:
-        raise OptionError(f"only {len(found)} of {count} placements fit, {layout.separation_m} m apart and in view")
-    return np.array(found).reshape(-1, 3)
 
 
 def _anywhere(rng: np.random.Generator, rig: Rig, layout: PairsLayout) -> Vector3:
