@@ -77,7 +77,7 @@ class NoiseOptions:
 
 @dataclass(frozen=True, slots=True)
 class RadarOptions:
-    """Radar errors common to all placements: standard deviations before any pair; 0 means exact."""
+    """Systematic errors of the radar: prior standard deviations; 0 means exact."""
 
     azimuth_scale_sigma: float = option(
         0.02,
@@ -154,7 +154,7 @@ class RefiningOptions:
 
 @dataclass(frozen=True, slots=True)
 class ReflectorOptions:
-    """Errors common to all clicks: standard deviations before any pair; 0 means exact."""
+    """Systematic errors of the clicks: prior standard deviations; 0 means exact."""
 
     offset_sigma_m: float = option(
         0.02,
@@ -163,7 +163,7 @@ class ReflectorOptions:
         high=1.0,
     )
     click_offset_sigma_px: float = option(
-        2.0, "Standard deviation of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
+        2.0, "Standard deviation of a constant click offset, per axis [px].", low=0.0, high=100.0
     )
 
 

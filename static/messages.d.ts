@@ -92,7 +92,7 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
-/** Radar errors common to all placements: standard deviations before any pair; 0 means exact. */
+/** Systematic errors of the radar: prior standard deviations; 0 means exact. */
 export interface RadarOptions {
   azimuth_scale_sigma: number;
   elevation_scale_sigma: number;
@@ -111,7 +111,7 @@ export interface LensOptions {
   distortion_sigma: number;
 }
 
-/** Errors common to all clicks: standard deviations before any pair; 0 means exact. */
+/** Systematic errors of the clicks: prior standard deviations; 0 means exact. */
 export interface ReflectorOptions {
   offset_sigma_m: number;
   click_offset_sigma_px: number;
@@ -203,7 +203,7 @@ export interface DismissedPlacement {
   position_m: [number, number, number];
 }
 
-/** One error that all pairs share, as a row of a table. */
+/** One systematic error, as a row of a table. */
 export interface SystematicErrorRow {
   figure: Figure;
   prior: string;
@@ -211,7 +211,7 @@ export interface SystematicErrorRow {
   rotation_percent: number;
 }
 
-/** The errors that all pairs share. */
+/** The systematic errors. */
 export interface SystematicErrorTable {
   rows: SystematicErrorRow[];
   sentences: Words[];

@@ -32,8 +32,8 @@ def residual_sentence(figures: ResidualFigures) -> str:
     lost = len(figures.ids) - figures.metrics.n
     behind = f"; {lost} more would be behind the camera" if lost else ""
     return (
-        f"residuals: AED {_px(figures.metrics.aed_px)}, CDSD {_px(figures.metrics.cdsd_px)}, median {_px(figures.median_px)}, "
-        f"{_percent(figures.inlier_share)} inliers ({_count(figures.metrics.n, 'click')} at "
+        f"residuals: mean reprojection error (AED) {_px(figures.metrics.aed_px)}, CDSD {_px(figures.metrics.cdsd_px)}, "
+        f"median {_px(figures.median_px)}, {_percent(figures.inlier_share)} inliers ({_count(figures.metrics.n, 'click')} at "
         f"{_count(placements, 'placement')}{behind})"
     )
 
@@ -79,9 +79,8 @@ def _residual_lines(figures: ResidualFigures) -> list[str]:
     rows = [residual_sentence(figures)]
     if figures.held_out is not None and figures.k_fold is not None:
         rows.append(
-            f"held out: {_held(figures.held_out)} with one placement left out at a time, {_held(figures.k_fold)} with "
-            f"{_count(figures.k_fold.folds, 'group')} of placements; a solve of the other clicks predicts them, whatever "
-            "calibration is judged"
+            f"leave-one-out: {_held(figures.held_out)} by placement, {_held(figures.k_fold)} with "
+            f"{_count(figures.k_fold.folds, 'group')} of placements; independent of the evaluated calibration"
         )
     rows.append(f"  {figures.association}")
     if figures.unpaired:

@@ -42,18 +42,18 @@ _WEAK_ECHO_DB = 6.0
 _SAME_PLACE = 3.0
 """Standard deviations between two candidates that are one place."""
 _VAGUE_PX = 3.0
-_VAGUE = "its apex is not seen clearly"
-_NO_FRAME = "the camera recorded no frame while it stood there"
-_NO_CHANGE = "nothing of the reflector's size changed in the image"
-_NO_POSE = "image and radar agree on no pose yet: click the first two places yourself"
-_OPEN = "the clicks leave open where it is; a further one says more"
-_NO_APEX = "what stood there shows no reflector's apex; if it is one, click the first two places yourself"
-_ELSEWHERE = "no place that changed lies where the other placements say"
-_TWO_PLACES = "two places there are about as likely"
-_TAKEN = "the only likely place is another reflector's"
-_FEW = "too few placements to compare with each other"
-_TWO_POSES = "the placements nearly agree on another mounting, too"
-_UNLIKELY = "what changed there does not look like the reflector"
+_VAGUE = "corner blurred"
+_NO_FRAME = "no camera frame of it"
+_NO_CHANGE = "no change of the reflector's size"
+_NO_POSE = "image and radar agree on no pose yet; click the first two placements yourself"
+_OPEN = "more clicks will help"
+_NO_APEX = "no inner corner seen; if it is the reflector, click the first two placements yourself"
+_ELSEWHERE = "no change where the other placements expect it"
+_TWO_PLACES = "two spots are about as likely"
+_TAKEN = "the only likely spot is another reflector's"
+_FEW = "too few placements to compare"
+_TWO_POSES = "another mounting fits nearly as well"
+_UNLIKELY = "what changed does not look like the reflector"
 
 
 def proposals_of(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.actions import CalibrateLens, SetOption
+from calib_core.results.verdict import SURE_PAIRS
 from calib_core.words import intrinsics, proposing
 from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.text import Words, join, option, say, sentence
@@ -40,6 +41,11 @@ def mirrored_axes(*, agreeing: int, pairs: int) -> Remark:
 
 
 def no_pose(*, agreeing: int, pairs: int) -> Remark:
+    if agreeing == pairs - 1 and pairs < SURE_PAIRS:
+        return remark(
+            f"one of the {pairs} pairs does not fit",
+            "one more placement will show which",
+        )
     return remark(
         f"only {agreeing} of {pairs} pairs agree on any pose",
         f"{_INTRINSICS}, and that the placements are spread over the image",

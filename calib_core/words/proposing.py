@@ -32,8 +32,8 @@ def nothing_proposed(*, placements: int) -> Remark:
     return remark(
         f"none of the {placements} placements shows where in the image the reflector stood",
         say(
-            "click the first two places yourself, on the page or with --clicks: they show how large the reflector is, what it "
-            "looks like and where the camera points; check the intrinsics, {axes} and that both recordings are of one time",
+            "click the first two placements yourself, on the page or with --clicks: they show how large the reflector is, what "
+            "it looks like and where the camera points; check the intrinsics, {axes} and that both recordings are of one time",
             axes=option("radar_axes"),
         ),
     )
@@ -54,12 +54,12 @@ def not_confident(
 ) -> Remark:
     if contradiction is not None:
         return remark(
-            "nobody confirmed the clicks, and the pose from them is contradictory: " + told(contradiction).message,
+            "the clicks are unconfirmed, and the pose from them is contradictory: " + told(contradiction).message,
             "open the recording on the page and confirm what it proposes, from one click on",
         )
     if camera_away_m:
         return remark(
-            f"nobody confirmed the clicks, and by them the camera is at least {camera_away_m:.1f} m from the radar: something "
+            f"the clicks are unconfirmed, and by them the camera is at least {camera_away_m:.1f} m from the radar: something "
             "that was carried along with the reflector would look the same",
             say(
                 "if it is that far away, measure its position with a tape ({position}); else look at the clicks on the page",
@@ -73,7 +73,7 @@ def not_confident(
     messages = {
         "few-placements": f"the radar shows {shown}, and agreement by chance needs more to be ruled out",
         "no-mounting": "images and radar agree on no mounting; do both belong to the same recording?",
-        "no-apex": "what stood still shows no reflector's apex in the images: it may be a person",
+        "no-apex": "what stood still shows no inner corner of a reflector in the images: it may be a person",
         "chance": f"{unclear}chance would do {figures}",
         "rival": f"{unclear}another mounting fits {figures}",
         "few-certain": f"{certain} of {shown} are certain enough, and {needed} are needed",

@@ -51,7 +51,7 @@ def _(calibration: Calibration) -> str:
     if advised is not None and not advised.may_stop:
         x_m, y_m, z_m = advised.position_radar_m
         percent = 100.0 * (1.0 - 1.0 / advised.gain)
-        advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m would reduce the pose uncertainty by {percent:.0f} %"
+        advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m: {percent:.0f} % less uncertainty"
     quaternion = quaternion_wxyz_from_matrix(pose.rotation)
     return "\n".join(
         (
@@ -59,8 +59,9 @@ def _(calibration: Calibration) -> str:
             "  translation     " + " ".join(f"{value:.4f}" for value in pose.translation_m) + " m",
             "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
             *(f"  {line}" for line in _uncertainty_lines(calibration)),
-            f"  residuals       AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, RMS {metrics.rms_px:.2f} px",
-            "  held-out AED    " + (f"{held_out_px:.2f} px" if np.isfinite(held_out_px) else "unknown"),
+            f"  residuals       mean reprojection error (AED) {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, "
+            f"RMS {metrics.rms_px:.2f} px",
+            "  leave-one-out   " + (f"{held_out_px:.2f} px" if np.isfinite(held_out_px) else "unknown"),
             "  warnings        " + (", ".join(warning.code for warning in calibration.warnings) or "none"),
             "  next placement  " + advice,
         )

@@ -1,4 +1,4 @@
-"""What the errors are called that all pairs share, what is known of them, and what would reduce them."""
+"""Names of the systematic errors, what is known of them, and what would reduce them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class ErrorWords:
         factor: from its own unit to the one shown.
         unit: shown behind the number; "" if it has none.
         remedy_with_tape: the same if the camera position is measured already; None if it is no different.
-        stated: where its standard deviation before any pair comes from, after the number.
+        stated: where its prior standard deviation comes from, after the number.
     """
 
     label: str
@@ -66,7 +66,7 @@ def _by(template: str, action: Action, path: str = "") -> Remedy:
 
 
 _APEX = _by(
-    "clicking the reflector's apex, where its three sheets meet, and stating a smaller sigma for it,",
+    "clicking the inner corner, where the three plates meet, and stating a smaller sigma for it,",
     SetOption("reflector.offset_sigma_m"),
 )
 _BOARD = _by("a camera calibration with more views of the board, over the whole image,", CalibrateLens())
@@ -198,19 +198,14 @@ def dominant_sentence(error: DominantError, *, measured: bool, with_remedy: bool
     family, known = FAMILIES.get(family_of(largest.name)), error_words(largest.name)
     parts = []
     if error.position_share:
-        parts.append(
-            f"{_share(error.position_share)} of the variance of the position ({two_digits(error.position_cm)} cm)"
-        )
+        parts.append(f"{_share(error.position_share)} of the position variance ({two_digits(error.position_cm)} cm)")
     if error.rotation_share:
-        which = "that" if parts else "the variance"
-        parts.append(
-            f"{_share(error.rotation_share)} of {which} of the rotation ({two_digits(error.rotation_deg)} deg)"
-        )
+        parts.append(f"{_share(error.rotation_share)} of the rotation variance ({two_digits(error.rotation_deg)} deg)")
     name = known.text if family is None else family.text
     if family is not None and family.names_largest:
         name = f"{name}, above all {known.text}"
-    come = "come" if len(parts) > 1 else "comes"
-    sentence = words(f"{' and '.join(parts)} {come} from {name}: {knowledge(largest)}")
+    verb = "are" if len(parts) > 1 else "is"
+    sentence = words(f"{' and '.join(parts)} {verb} {name}: {knowledge(largest)}")
     if not with_remedy:
         return sentence
     return join((sentence, remedy_of(largest.name, measured=measured).phrase + " would reduce it"), "; ")
@@ -237,17 +232,17 @@ def two_digits(value: float) -> str:
 
 
 def prior_text(name: str, prior_sigma: float) -> str:
-    """Write a standard deviation before any pair: "± 2 %"."""
+    """Write a prior standard deviation: "± 2 %"."""
     known = error_words(name)
     return f"± {two_digits(known.factor * prior_sigma)} {known.unit}".rstrip()
 
 
 def knowledge(error: SystematicErrorResult) -> str:
-    """Say what is known of an error: "+1.2 ± 0.9 %, ± 2 % before any pair", or that the pairs do not determine it."""
-    prior = prior_text(error.name, error.prior_sigma)
+    """Say what is known of an error: "+1.2 ± 0.9 % (± 2 % assumed)", or that the pairs do not determine it."""
+    prior = f"{prior_text(error.name, error.prior_sigma)} {error_words(error.name).stated}"
     if not is_determined(error) and not is_beyond_its_prior(error):
-        return f"{prior} {error_words(error.name).stated}, the pairs do not determine it"
-    return f"{value_text(error.name, error.value, error.sigma)}, {prior} before any pair"
+        return f"{prior}, the pairs do not determine it"
+    return f"{value_text(error.name, error.value, error.sigma)} ({prior})"
 
 
 def value_text(name: str, value: float, sigma: float) -> str:

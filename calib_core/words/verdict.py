@@ -30,7 +30,7 @@ from calib_core.words.systematic_errors import remedy_of
 from calib_core.words.text import Words, join, listed, option, words
 from calib_core.words.warnings import told
 
-_CORNER = "the reflector's inner corner, where its three sheets meet"
+_CORNER = "the inner corner, where the three plates meet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def reason(verdict: Verdict) -> Words:
     if verdict.level in ("good", "usable"):
         return words(error)
     few = f"{verdict.pairs} of {SURE_PAIRS} pairs" if verdict.pairs and cause is None else ""
-    return join((cause or few, f"uncertain to {error}"), "; ")
+    return join((cause or few, f"within {error}"), "; ")
 
 
 def cause_told(verdict: Verdict) -> Remark:
@@ -165,7 +165,7 @@ def _(action: ClickMore) -> Words:
 def _(action: PlaceReflector) -> Words:
     percent = 100.0 * (1.0 - 1.0 / action.gain)
     where = placement_words(action.position_radar_m[0], action.position_radar_m[1])
-    return words(f"Put the reflector {where}: that would reduce the pose uncertainty by {percent:.0f} %")
+    return words(f"Put the reflector {where}: {percent:.0f} % less uncertainty")
 
 
 @words_of.register
@@ -219,10 +219,10 @@ def _(action: SpreadPlacements) -> Words:
 
 
 def placement_words(forward_m: float, left_m: float) -> str:
-    """Say where a placement is: "4.5 m ahead, 2.1 m to the left"."""
+    """Say where a placement is: "4.5 m ahead and 2.1 m left"."""
     if abs(left_m) < 0.1 * abs(forward_m):
         return f"{forward_m:.1f} m straight ahead"
-    return f"{forward_m:.1f} m ahead, {abs(left_m):.1f} m to the {'left' if left_m > 0 else 'right'}"
+    return f"{forward_m:.1f} m ahead and {abs(left_m):.1f} m {'left' if left_m > 0 else 'right'}"
 
 
 def assumed_words(assumed: Assumed | None) -> Words:
@@ -230,16 +230,19 @@ def assumed_words(assumed: Assumed | None) -> Words:
     if assumed is None:
         return Words()
     if assumed.measured:
-        known = f" (the pairs alone place it within {assumed.alone_cm:g} cm)" if np.isfinite(assumed.alone_cm) else ""
-        first, whose = f"the camera was measured right{known}", "the radar's"
+        alone = f" (the pairs alone: within {assumed.alone_cm:g} cm)" if np.isfinite(assumed.alone_cm) else ""
+        first = f"a correct camera position{alone}"
     else:
-        first, whose = "you clicked the very point that the radar sees", "its"
-    sides = "no radar axis is mirrored, " if assumed.not_mirrored else ""
-    heights = f"{whose} elevations are right, and " if assumed.elevations else ""
-    centre = "the image is neither cropped nor resized"
-    if np.isfinite(assumed.principal_point_px):
-        centre += f", its principal point right to {assumed.principal_point_px:.2g} px"
-    return words(f"{first}, {sides}{heights}{centre}")
+        first = "clicks on the phase centre"
+    principal_point = f"the principal point within {assumed.principal_point_px:.2g} px"
+    parts = (
+        first,
+        "unmirrored radar axes" if assumed.not_mirrored else "",
+        "correct elevations" if assumed.elevations else "",
+        "a full-size image",
+        principal_point if np.isfinite(assumed.principal_point_px) else "",
+    )
+    return join(parts, ", ")
 
 
 def capitalized(phrase: Words) -> Words:

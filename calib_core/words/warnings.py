@@ -23,7 +23,7 @@ from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.systematic_errors import FAMILIES, error_words, knowledge, percent, prior_text, value_text
 from calib_core.words.text import Words, count, join, listed, named, option, say
 
-_APEX = "the reflector's apex, where its three sheets meet, not its mouth or its stand"
+_APEX = "the inner corner, where the three plates meet, not the reflector's mouth or stand"
 _ONE_BY_ONE = "was the reflector clicked, was it at rest, do both recordings use the same clock?"
 _BY_TAPE = "measure the camera position with a tape"
 
@@ -41,7 +41,8 @@ def no_consensus(*, agreeing: int, pairs: int) -> Remark:
 
 def few_pairs(*, agreeing: int, pairs: int, needed: int, clear: bool) -> Remark:
     """Given when fewer than 8 pairs determine the pose; it replaces the warnings that only more pairs can settle."""
-    seen = f"{agreeing} of {pairs} pairs agree, and {needed} are needed"
+    misfits = pairs - agreeing
+    seen = f"{agreeing} of {needed} pairs; {misfits} {'does' if misfits == 1 else 'do'} not fit"
     if agreeing == pairs:
         seen = f"{agreeing} of {needed} pairs, {'looks consistent' if clear else 'not clear yet'}"
     return remark(seen, "add placements: ten or more, near and far, on both sides")
@@ -122,7 +123,7 @@ def weak_geometry(
             SetOption("method", "default"),
         )
     message = (
-        f"the pose is uncertain: {size}; placements span {nearest_m:.1f} to {farthest_m:.1f} m and "
+        f"the geometry is ill-conditioned: {size}; placements span {nearest_m:.1f} to {farthest_m:.1f} m and "
         f"{azimuth_span_deg:.0f} deg"
     )
     spread = "place the reflector near (2 to 3 m) and far, at both edges of the image"
@@ -187,8 +188,8 @@ def doubtful_pair(*, pair: str, camera_moves_cm: float, sigmas: float, switched:
     changed = say(", and {switched} would change sides", switched=listed(switched)) if switched else Words()
     return remark(
         say(
-            "the pose rests on {name}: without {name} the camera moves {camera_moves_cm:.0f} cm, {sigmas:.1f} standard "
-            "deviations{changed}",
+            "the pose rests on {name}, a high-leverage pair: without {name} the camera moves {camera_moves_cm:.0f} cm, "
+            "{sigmas:.1f} σ{changed}",
             name=name,
             camera_moves_cm=camera_moves_cm,
             sigmas=sigmas,
@@ -256,7 +257,8 @@ def handedness_open() -> Remark:
     Could also be: which of the two is right: measure the camera position, or vary the heights.
     """
     return remark(
-        "a mirrored radar axis would explain the pairs about as well, or put radar and camera on one side of the floor",
+        "reflection ambiguity: a mirrored radar axis explains the pairs about as well, or puts radar and camera on one side of "
+        "the floor",
         f"{_BY_TAPE}, or add placements at other heights (a tripod)",
         MeasureCameraPosition(),
     )
@@ -269,8 +271,8 @@ def handedness_assumed(*, within_m: float) -> Remark:
     Could also be: whether an axis is mirrored, if the camera were farther away than assumed.
     """
     return remark(
-        "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred only "
-        f"from the camera being within about {within_m:g} m of the radar",
+        "reflection ambiguity: the placements lie near one plane, so mirrored radar axes fit equally well; that none is mirrored "
+        f"is inferred only from the camera being within about {within_m:g} m of the radar",
         "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
         MeasureCameraPosition(),
     )
@@ -342,7 +344,7 @@ def two_poses(
     if agreeing:
         return remark(
             say(
-                "another pose, {away}, explains the pairs as well: {count} of {pairs} agree on it, {ids}",
+                "pose ambiguity: another pose, {away}, explains the pairs as well; {count} of {pairs} agree on it: {ids}",
                 away=_away(away_deg, away_cm),
                 count=len(agreeing),
                 pairs=pairs,
@@ -353,18 +355,18 @@ def two_poses(
         )
     if probability:
         return remark(
-            f"another pose, {_away(away_deg, away_cm)}, may be the right one (probability {100 * probability:.0f} %): it is not "
-            "clear which of the pairs are wrong",
+            f"pose ambiguity: another pose, {_away(away_deg, away_cm)}, may be the right one (probability "
+            f"{100 * probability:.0f} %); it is not clear which of the pairs are wrong",
             nearer,
             MeasureCameraPosition(),
         )
-    other = f"two poses fit: the other is {_away_sigmas(away_deg, away_cm, sigmas)}"
+    two = f"two poses fit, {away_deg:.1f} deg and {away_cm / 100:.2f} m apart ({sigmas:.0f} σ)"
     if not other_returns:
-        return remark(other, nearer, MeasureCameraPosition())
+        return remark(two, nearer, MeasureCameraPosition())
     return remark(
         say(
-            "{other}, with other returns for {ids}{more}",
-            other=other,
+            "{two}; they differ in {ids}{more}",
+            two=two,
             ids=join(map(named, other_returns[:3]), ", "),
             more=" and others" if other_returns[3:] else "",
         ),
@@ -378,7 +380,7 @@ def _away(away_deg: float, away_cm: float) -> str:
 
 
 def _away_sigmas(away_deg: float, away_cm: float, sigmas: float) -> str:
-    return f"{away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} standard deviations)"
+    return f"{away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} σ)"
 
 
 def camera_far_away(
@@ -691,8 +693,8 @@ def nobody_confirmed(*, placed: int, clicks: int, confidence: float) -> Remark:
     """
     of_all = f"all {clicks} clicks were" if placed == clicks else f"{placed} of {clicks} clicks were"
     return remark(
-        f"{of_all} placed automatically (confidence {probability_text(confidence)}), and nobody confirmed them",
-        "look at each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
+        f"{of_all} placed automatically (confidence {probability_text(confidence)}), and are unconfirmed",
+        "confirm each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
     )
 
 

@@ -21,7 +21,7 @@ const IN_REPORT = [
   "Answer: verdict, transform both ways, error bars",
   "Cautions: warnings, and what to do",
   "Uncertainty in the image at 5, 20 and 60 m",
-  "Residuals against range, azimuth, place and time",
+  "Residuals against range, azimuth, position and time",
   "Coverage of image and range",
   "Pairs",
   "Provenance: files by their hashes, options, versions",
@@ -93,8 +93,8 @@ async function loadFormats() {
 /** What the page Deliver offers. @type {[string, string, string, string][]} */
 const DELIVERED = [
   ["export", "Export…", "", "The pose, for ROS, Autoware, Kalibr and others"],
-  ["report", "Report…", REPORT, "How good it is, and how one knows: one HTML file"],
-  ["clicks", "Clicks…", CLICKS, "To go on with on another machine"],
+  ["report", "Report…", REPORT, "Accuracy report (HTML)"],
+  ["clicks", "Clicks…", CLICKS, "Continue on another computer"],
 ];
 
 export function startDelivering() {

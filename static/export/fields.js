@@ -129,7 +129,7 @@ export function rawBox(changed) {
   box.type = "checkbox";
   box.addEventListener("change", changed);
   const label = make("label", "", [box, "For radar data as reported: my software does not correct them"]);
-  label.dataset.hint = "Solved once more without taking out what the radar gets wrong (--for raw).";
+  label.dataset.hint = "Solved again without radar corrections, for software that cannot correct radar biases (--for raw).";
   return { box, row: make("div", "rectified raw", [label]) };
 }
 

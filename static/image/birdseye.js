@@ -352,7 +352,7 @@ function drawLegend() {
 function drawTable() {
   const here = placementAt(state.cursor);
   if (!state.placements.length) {
-    const words = state.placementsKnown ? state.placementSummary : "Searching the radar data for places where the reflector stood still…";
+    const words = state.placementsKnown ? state.placementSummary : "Looking for placements in the radar data…";
     return page.replaceChildren(make("p", "none-found", words ? `${words}.` : "The radar data could not be searched."));
   }
   const heads = [["", ""], ["Time", "From when on, since the first scan"], ["Lasted", "How long it stood still"], ["Range", "Distance from the radar"], ["Azimuth", "Angle from straight ahead"], ["Amplitude", "Mean amplitude of its returns"], ["Above", "Above the strong static returns elsewhere at its range, while it stood"]];

@@ -87,7 +87,7 @@ function drawAdvice(pen, advice) {
   pen.textAlign = "center";
   pen.lineWidth = 3 * viewport.unit;
   pen.strokeStyle = ink.edge;
-  const words = `next ${advice.range_m.toFixed(1)} m`;
+  const words = "best next placement";
   const low = y + high + 13 * viewport.unit;
   const at = low < pen.canvas.height - PILL * viewport.unit ? low : y - high - 4 * viewport.unit;
   pen.strokeText(words, x, at);

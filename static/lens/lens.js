@@ -102,7 +102,7 @@ function drawPresent(lens) {
   present.hidden = !camera && running();
   if (!camera) {
     const words = lens.images
-      ? "The lens is not known yet. Calibrate it here from a board in this recording, or drop a camera file on the page. Clicks can be placed already; the pose follows once the lens is known."
+      ? "The lens is not known yet. Calibrate it here from a board in this recording, or drop a camera file on the page. You can click now; the pose needs the lens."
       : "There are no images in this recording.";
     return present.replaceChildren(make("h2", "", "No intrinsics"), make("p", "lens-none", words));
   }

@@ -258,7 +258,7 @@ function askIntrinsics() {
   calibrate.onclick = () => showPage("lens");
   const others = make("button", "chip", "More…");
   others.onclick = chooseRecording;
-  strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once the lens is calibrated or its file is dropped here."]), calibrate, pick, others, input);
+  strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "You can click now. For a pose, calibrate the lens or drop its file here."]), calibrate, pick, others, input);
 }
 
 /** @typedef {{choices: Choices, draft: Draft, folder: import("../messages.js").FolderListing|null, redraw: () => void, give: (file: File) => void, choose: () => void, enter: (path: string) => void, forget: () => void}} Tools */

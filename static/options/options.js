@@ -45,15 +45,15 @@ const LABELS = {
   "refining.principal_point_sigma_px": "Principal point",
   "refining.distortion_sigma": "Distortion (k1)",
   "reflector.offset_sigma_m": "Clicked point to phase centre",
-  "reflector.click_offset_sigma_px": "One person's clicks",
+  "reflector.click_offset_sigma_px": "Click offset",
   "solving.sensors_above_placements": "Sensors above the placements",
 };
 /** Headings that say more than the group's name. @type {Record<string, string>} */
 const HEADINGS = {
-  radar: "Radar: errors that all pairs share, ± before any pair",
+  radar: "Radar: systematic errors, ± assumed",
   lens: "Lens: errors of the intrinsics, ±",
   refining: "Refining the intrinsics: how far off they may be, ±, if they come without a covariance",
-  reflector: "Reflector: what all clicks are off by, ±",
+  reflector: "Reflector: constant click offset, ±",
 };
 /** @type {Record<string, string>} */
 const METHODS = { default: "Default", paper: "Paper" };

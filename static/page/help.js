@@ -26,7 +26,7 @@ const MARKS = [
   ["M1 8a7 4 0 1 0 14 0a7 4 0 1 0-14 0z||ring", "ellipse: contains 95 % of the clicks of good pairs"],
   ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5|guess", "dashed circle: expected position of the reflector"],
   ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best next placement"],
-  ["M8 1v4M8 11v4M1 8h4M11 8h4|2 1.5", "dashed cross: proposal, with a ring that contains 95 % of its error; numbers: other places"],
+  ["M8 1v4M8 11v4M1 8h4M11 8h4|2 1.5", "dashed cross: proposal, with a ring that contains 95 % of its error; numbers: other spots"],
   ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: static radar return"],
   ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return"],
 ];

@@ -21,9 +21,9 @@ const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forwa
 
 export function startFigures() {
   const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, assumedLine, adviceLine]);
-  const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
+  const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
-  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]));
+  systematic.append(make("div", "pose-head", "Systematic errors"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]));
   posePage.append(poseHead, apart, pose, systematic);
   onPainted(["view", "recording", "placements"], draw);
 }

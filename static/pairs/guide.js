@@ -6,7 +6,7 @@ import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementA
 import { openOption } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
-import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
+import { placementWords, proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -54,7 +54,7 @@ const LENS = { key: "", label: "open Lens", action: "lens" };
 const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
 /** @type {Words} */
 const BEYOND = ["No radar return within the maximum range.", RANGE];
-const NEXT = { key: "N", label: "next place", action: "next-placement" };
+const NEXT = { key: "N", label: "next placement", action: "next-placement" };
 
 /** @param {number} index @returns {Advice|null} */
 function advice(index) {
@@ -70,9 +70,9 @@ function advice(index) {
   if (placement && isDismissed(placement)) return { text: ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT], act: false };
   if (placement && isOffered(placement)) {
     const number = state.placements.indexOf(placement) + 1;
-    const several = placementsAt(index).length > 1 ? `, one of ${placementsAt(index).length} at this time` : "";
+    const several = placementsAt(index).length > 1 ? `, one of ${placementsAt(index).length} now` : "";
     const why = found || silentWords(number - 1);
-    return { text: [`Placement ${number}, ${placement.range_m.toFixed(1)} m away${several}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT], act: true };
+    return { text: [`${placementWords(number - 1)}${several}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT], act: true };
   }
   const next = nextAction();
   return next ? { text: next, act: false } : null;
@@ -88,7 +88,7 @@ function atCross(cross) {
 /** What is wrong with the pair of this frame, or else what to do next. @param {import("../messages.js").ClickRow} click @returns {Advice|null} */
 function afterClick(click) {
   const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
-  if (better) return { text: [better, { key: "C", label: "take it", action: "next-candidate" }], act: true };
+  if (better) return { text: [better, { key: "C", label: "take the other", action: "next-candidate" }], act: true };
   if (click.state === "untouched") return { text: ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true };
   if (click.state === "unpaired") return { text: state.view?.verdict.option === RANGE.option ? BEYOND : ["No radar position here: click another frame of this placement.", NEXT], act: true };
   if (click.state === "outlier") return { text: outlierWords(click), act: true };
@@ -124,6 +124,6 @@ function nextAction() {
   if (key === "J") return [action, SHOW];
   const edge = kind === "SpreadPlacements" ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
   if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : goOn)];
-  if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
+  if (!state.placementsKnown) return ["Looking for placements. You can click meanwhile."];
   return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
 }

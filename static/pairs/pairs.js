@@ -41,7 +41,7 @@ export function startPairs() {
   register(
     { id: "mark", group: "Panel", words: "Mark: the pairs and the returns that each may use", also: "tab table list clicks placements candidates", run: () => showPage("mark") },
     { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-    { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withImages() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+    { id: "exclude", group: "Pairs", words: "Exclude or include the pair; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withImages() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
   );
   onPainted(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
@@ -99,7 +99,7 @@ function draw() {
 function reflector() {
   const parts = [["left", "M60 4 60 62 6 98z"], ["right", "M60 4 60 62 114 98z"], ["floor", "M60 62 6 98 114 98z"], ["corner", "M60 53a9 9 0 1 0 .01 0z"]];
   const drawing = shape("svg", { viewBox: "0 0 120 104", "aria-hidden": "true" }, parts.map(([name, d]) => shape("path", { d, class: name })));
-  const words = [make("strong", "", "Click the reflector's inner corner"), " where its three sheets meet, at each place where it stood. Eight places or more tell where the camera is, seen from the radar."];
+  const words = ["At every placement, mark the ", make("strong", "", "inner corner"), ", where the three plates meet. You need at least 8 placements."];
   return make("figure", "reflector", [drawing, make("figcaption", "", words)]);
 }
 

@@ -16,7 +16,7 @@ import { acceptProposal, heldBack, isSearching, nextPlace, nextProposal, openPro
 const FIRST = 2;
 
 /** How many placements wait: with proposals those that were found, without any all; nothing while they are being searched for. */
-const leftWords = () => (isSearching() ? "" : `, ${openProposals().length || state.placements.filter(isOffered).length} left`);
+const leftWords = () => (isSearching() ? "" : ` (${openProposals().length || state.placements.filter(isOffered).length} left)`);
 
 /** N found no proposal: say why, if that is not because all are decided. */
 function sayNone() {
@@ -26,7 +26,7 @@ function sayNone() {
 }
 
 /** What N does. */
-export const proposalAdvice = () => `${state.view?.clicks.length ? "next" : "first"} place where the reflector stood${leftWords()}`;
+export const proposalAdvice = () => `${state.view?.clicks.length ? "Next" : "First"} placement${leftWords()}`;
 
 /** What is proposed, and what to do, for the line on the frame; null if nothing is. @returns {Words|null} */
 export function proposalWords() {
@@ -35,19 +35,22 @@ export function proposalWords() {
   const offer = shownOffer();
   if (!offer) return null;
   const { row, number } = offer;
-  const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
-  const why = row.reason && !number ? `: ${row.reason}` : "";
+  const sure = number ? `spot ${number + 1} of ${row.places.length}` : surely(row.confidence);
+  const why = row.reason && !number ? `, ${row.reason}` : "";
   return [
-    `${saidWords()} Placement ${row.placement + 1}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}${leftWords()}.`.trim(),
+    `${saidWords()} ${placementWords(row.placement)} · ${sure}${why}`.trim(),
     { key: "Enter", label: "accept", action: "place-mark" },
-    ...(row.places.length > 1 ? [{ key: "C", label: "other place", action: "next-candidate" }] : []),
+    ...(row.places.length > 1 ? [{ key: "C", label: "other spot", action: "next-candidate" }] : []),
     { key: "X", label: "no reflector", action: "exclude" },
-    { key: "N", label: "next", action: "next-placement" },
+    { key: "N", label: `next${leftWords()}`, action: "next-placement" },
   ];
 }
 
+/** Which placement it is. @param {number} index */
+export const placementWords = (index) => `Placement ${index + 1} of ${state.placements.length} · ${state.placements[index].range_m.toFixed(1)} m`;
+
 /** A probability in words; none is certain. @param {number} confidence */
-const surely = (confidence) => (confidence > 0.99 ? "over 99 % sure" : `${Math.round(100 * confidence)} % sure`);
+const surely = (confidence) => `${Math.min(99, Math.round(100 * confidence))} % sure`;
 
 /** Why a placement has no proposal, as a sentence; "" if it has one or nothing is known. @param {number} placement */
 export function silentWords(placement) {
@@ -55,8 +58,8 @@ export function silentWords(placement) {
   if (!news?.on) return "";
   if (isSearching()) return ""; // the status line says so
   const reason = news.unproposed.find((one) => one.placement === placement)?.reason;
-  if (reason && !news.rows.length && (state.view?.clicks.length ?? 0) < FIRST) return "No proposals yet: click the first two places yourself.";
-  return reason ? `Not proposed: ${reason}.` : "";
+  if (reason && !news.rows.length && (state.view?.clicks.length ?? 0) < FIRST) return "No proposals yet: click the first two placements yourself.";
+  return reason ? `Nothing found here: ${reason}.` : "";
 }
 
 /** How far the proposals are, in one line; "" if they are not being made. */
@@ -105,5 +108,5 @@ function drawChip() {
   chip.setAttribute("aria-pressed", String(Boolean(news?.on)));
   chip.classList.toggle("troubled", Boolean(news?.on && news.progress.problem));
   chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.progress.done}/${news.progress.count}` : news?.on && news.progress.problem ? "Proposals: none" : "Proposals");
-  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the image shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
+  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the image shows where. Proposals count once you accept them. (O)", progressWords()].filter(Boolean).join("\n");
 }

@@ -323,7 +323,7 @@ function spread(values) {
 function told(row) {
   const { click } = row;
   const side = (/** @type {number|null} */ angle, /** @type {string} */ plus, /** @type {string} */ minus) => `${Math.abs(angle ?? 0).toFixed(1)}° ${(angle ?? 0) >= 0 ? plus : minus}`;
-  const more = [row.heldOut === null ? "" : `held out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
+  const more = [row.heldOut === null ? "" : `leave-one-out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
   return [`${nameOf(click.id)}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
 }
 

@@ -16,12 +16,12 @@ def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) 
     assert "inner corner" in page.text(".reflector")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[0].frame")
     assert page.value("document.getElementById('guide').classList.contains('act')")
-    assert page.text("#guide").startswith("Placement 1, ")
+    assert page.text("#guide").startswith("Placement 1 of ")
     page.press("n")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[1].frame")
     u, v = page.value("[__cocalib.viewport.imageWidth / 2, __cocalib.viewport.imageHeight / 2]")
     page.click(u, v)
-    assert "next place" in page.text("#guide")
+    assert "Next placement" in page.text("#guide")
     assert page.page.locator(".reflector").count() == 0
     assert page.page.locator(".pairs .row").count() == 1
 

@@ -1,5 +1,6 @@
 """Confirming instead of clicking: proposals appear while images are looked at, and each is decided with a key or a click."""
 
+import re
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -107,8 +108,9 @@ def guide(page: Driver) -> str:
 
 def left(page: Driver) -> int:
     """Return how many placements wait, as the line on the frame says."""
-    words = guide(page).replace(".", " ").split()
-    return int(words[words.index("left") - 1])
+    found = re.search(r"(\d+) left", guide(page))
+    assert found is not None
+    return int(found[1])
 
 
 def off_px(page: Driver, images: Images) -> float:
@@ -141,7 +143,7 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
         if page.value("__cocalib.shownOffer() === null"):
             page.press("n")
             page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
-            assert "Not proposed: " in page.text("#guide")
+            assert "Nothing found here: " in page.text("#guide")
             page.click(*images.at(page.value("__cocalib.stampOf(__cocalib.state.cursor)")))
             count += 2
         elif off_px(page, images) < 3.0:
@@ -212,7 +214,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     first, before = guide(page), left(page)
     placement = page.value("__cocalib.shownOffer().row.placement")
     page.press("c")
-    assert "place 2 of 4" in guide(page)
+    assert "spot 2 of 4" in guide(page)
 
     page.press("x")
     page.until("__cocalib.state.view.dismissed.length === 1")
@@ -221,7 +223,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     assert page.value("__cocalib.shownOffer()?.row.placement") != placement
     page.press("Control+z")
     page.until(f"__cocalib.state.view.dismissed.length === 0 && __cocalib.shownOffer()?.row.placement === {placement}")
-    assert guide(page).split(",")[0] == first.split(",")[0]
+    assert guide(page).split(" · ")[0] == first.split(" · ")[0]
 
     u, v = page.value("__cocalib.shownOffer().place.pixel_px")
     page.click(u + 25, v + 25)
@@ -250,7 +252,7 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
     page.go_to(page.value("__cocalib.state.placements[15].frame"))
     assert page.text("#status-text") == "Searching, 8 of 20"
     page.press("Enter")  # leads to one of those that are ready
-    assert " left." not in guide(page), "how many there are is not known yet"
+    assert " left" not in guide(page), "how many there are is not known yet"
     assert page.view["clicks"] == []
     assert page.value("__cocalib.state.cross") is None
     page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")

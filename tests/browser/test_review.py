@@ -37,7 +37,7 @@ def reviewing(open_page: Callable[..., Driver], server: RunningServer, workspace
     page.until("__cocalib.state.view.has_calibration")
     page.settle()
     page.page.click("#tab-check")
-    page.until("document.querySelector('.review-words').textContent.includes('leans most on')")
+    page.until("document.querySelector('.review-words').textContent.includes('matters most')")
     page.drawn()
     return page
 
@@ -102,7 +102,7 @@ def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_l
     page.until("__cocalib.state.selected === 'c5'")
     assert page.value("__cocalib.state.cursor") == page.frame_at(truth["placements"][4]["best_image_time"])
     page.until("document.querySelector('.review-pair h2').textContent === 'Pair 5'")
-    assert "return at 6.41 m" in page.text(".review-pair")
+    assert "6.41 m return" in page.text(".review-pair")
     assert page.page.locator(".review-candidates tbody tr").count() > 1
 
     page.page.focus("[data-plot=time]")

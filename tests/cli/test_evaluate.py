@@ -66,9 +66,9 @@ def test_residuals_come_first_and_say_what_they_rest_on(cocalib, solved):
     first, held, *_ = answer.out.splitlines()
 
     assert answer.code == 0
-    assert first.startswith("residuals: AED ")
+    assert "(AED) " in first
     assert "8 placements" in first
-    assert held.startswith("held out: AED ")
+    assert held.startswith("leave-one-out: AED ")
     document = json.loads(cocalib("evaluate", solved, recording, "--json").out)
     assert document["schema"] == "cocalib/evaluation-1"
     assert document["residuals"]["aed_px"] == pytest.approx(

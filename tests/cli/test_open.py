@@ -82,5 +82,5 @@ def test_clicks_that_nobody_confirmed_are_opened_with_a_note(served, made, click
     document = json.loads(clicks_file.read_text())
     clicks_file.write_text(json.dumps({**document, "unconfirmed": {"clicks": ["c1", "c4"], "confidence": 0.97}}))
     assert run(["open", str(made()), "--clicks", str(clicks_file), "--no-browser"]) == 0
-    assert f"note: {clicks_file}: nobody confirmed 2" in capsys.readouterr().err
+    assert f"note: {clicks_file}: 2 of these clicks" in capsys.readouterr().err
     assert len(served[0].session.clicks) == len(document["clicks"])

@@ -158,7 +158,7 @@ def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_re
 def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(cocalib, recording, solved):
     answer = cocalib("solve", recording, *SIZE, "--auto", "--clicks", solved.clicks)
     assert (answer.code, answer.out) == (2, "")
-    assert f"{solved.clicks}: nobody confirmed 11" in answer.err
+    assert f"{solved.clicks}: 11 of its clicks" in answer.err
 
 
 def test_the_sample_is_solved_without_a_person(cocalib, project_root, tmp_path):

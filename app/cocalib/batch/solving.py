@@ -71,7 +71,7 @@ def given_files(row: ManifestRow) -> GivenFiles:
     clicks = None if row.clicks is None else file_of_clicks(row.clicks)
     if row.auto and clicks is not None and clicks.unconfirmed is not None:
         raise InputError(
-            f"{row.clicks}: nobody confirmed {len(clicks.unconfirmed.ids)} of its clicks; with auto give only clicks that a "
+            f"{row.clicks}: {len(clicks.unconfirmed.ids)} of its clicks are unconfirmed; with auto give only clicks that a "
             "person placed"
         )
     return GivenFiles(camera, clicks)

@@ -31,7 +31,7 @@ class Check:
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION...")] = ()
     """Calibrations in any format that export writes; of several, each gets one line."""
     of: File = None
-    """Is it this calibration's file? Same pose up to the digits written, same lens and frames, not stale."""
+    """Verify that the file was exported from that calibration: same pose up to the digits written, same lens and frames."""
     against: File = None
     """Does it agree with this other calibration? Judged by the covariances, or by the limits below."""
     max_deg: Annotated[float | None, called("DEG")] = None
@@ -45,7 +45,7 @@ class Check:
     same_sensors: Switch = False
     """With --against: radar and camera are the same, although serials, topics or intrinsics are not."""
     same_person: Switch = False
-    """With --against: the same person clicked the same reflector in both, so what those get wrong cancels, too."""
+    """With --against: the same person clicked the same reflector in both, so their common errors cancel."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     pairs: File = None

@@ -116,7 +116,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "evaluate",
             "cocalib.cli.evaluate:Evaluate",
-            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), returns in boxes (Acc); or write a report.",
+            "Evaluate a calibration on a recording: mean reprojection error (AED), share of returns in boxes (Acc); or a report.",
             (
                 "calibration.json other.mcap",
                 "calibration.json --report report.html --require max-deg=1",

@@ -36,7 +36,7 @@ _HTML, _PDF = (".html", ".htm"), (".pdf",)
 class Evaluate:
     """Judge a calibration on a recording: residuals at clicks (AED, CDSD), returns in boxes (Acc); or write a report.
 
-    A report needs no recording: it says how good the calibration is, where, and how one knows.
+    A report needs no recording: it states the accuracy of the calibration, where in the image, and the evidence.
     """
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
@@ -48,7 +48,7 @@ class Evaluate:
     require: Annotated[tuple[str, ...], called("LIMIT...")] = ()
     """Exit code 3 for a verdict below good or usable, or a stated 95 % error above max-deg=1 max-cm=10 max-px=15."""
     no_held_out: Switch = False
-    """Leave out the held-out figures, which take a solve per placement."""
+    """Skip the leave-one-out figures, which take a solve per placement."""
     json: Switch = False
     """Print one JSON object instead of text."""
     judging: Judging = field(default_factory=JudgingFlags)
@@ -110,7 +110,7 @@ class Evaluate:
         if evaluation is not None:
             print("\n".join(evaluation_lines(evaluation)))
             if verdict is not None:
-                print(f"verdict when it was solved: {verdict.line}")
+                print(f"stored verdict: {verdict.line}")
         for one in limits:
             print(f"{one.name}={one.limit:g}: {'pass' if one.met else 'FAIL'}, stated {one.stated:g}")
         return code

@@ -19,7 +19,8 @@ _ENOUGH: Final[dict[str | None, tuple[str, ...]]] = {"usable": ("good", "usable"
 _LAW: Final = (
     (
         "solve, import and evaluate",
-        "0 done; 1 no answer (evaluate: nothing to judge by); 3 in doubt: contradictory or unproven, or short of --require",
+        "0 done; 1 no answer (evaluate: no clicks or boxes to evaluate against); 3 contradictory, unconfirmed "
+        "assumptions, or below --require",
     ),
     ("check", "0 agrees or sound; 1 differs or wrong; 2 unreadable; 3 cannot be decided"),
     (

@@ -47,7 +47,7 @@ class Export:
     rectified: Switch = False
     """Your images are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
     for_: Annotated[Literal["raw"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
-    """raw: the pose for radar data as reported, for users who cannot take out what the radar gets wrong."""
+    """raw: the pose for radar data as reported, for software that cannot correct radar biases."""
     trees: Trees = field(default_factory=TreeFlags)
     frames: Frames = field(default_factory=FrameFlags)
 

@@ -80,8 +80,8 @@ class EvidenceFlags:
         boxes, labels = self.boxes_in(recording)
         if not clicks and boxes is None:
             raise NoAnswerError(
-                f"{paths[0]}: nothing to judge {judged} by: no clicks (--clicks CLICKS.json; click reflectors with "
-                "cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
+                f"{paths[0]}: no clicks or boxes to evaluate {judged} against: give clicks (--clicks CLICKS.json; click "
+                "reflectors with cocalib open RECORDING --calibration FILE) or boxes (--boxes FILE_OR_TOPIC)"
             )
         return clicks, boxes, labels
 

@@ -98,7 +98,7 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
 
 def _view_lines(lens: CalibratedLens) -> Iterator[str]:
     width = max(len(view.corners.name) for view in lens.views)
-    yield f"{'view':<{width}}  corners  used  RMS px  held out px"
+    yield f"{'view':<{width}}  corners  used  RMS px  leave-one-out px"
     for view in lens.views:
         used = int(view.used.sum())
         yield (

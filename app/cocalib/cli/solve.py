@@ -59,7 +59,7 @@ class Solve:
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     auto: Switch = False
-    """Click without a person where images and radar agree; with --clicks, only placements without a click."""
+    """Place clicks automatically where images and radar agree; with --clicks, only at placements without a click."""
     propose: Switch = False
     """Solve nothing: list where the reflector probably stood, for a person or a script to confirm; --out keeps it as JSON."""
     clicks_out: OutFile = None
@@ -213,7 +213,7 @@ class Solve:
             return PlacedClicks(clicks, file.unconfirmed)
         if file.unconfirmed is not None:
             raise InputError(
-                f"{self.clicks}: nobody confirmed {len(file.unconfirmed.ids)} of its clicks; with --auto give only clicks that a "
+                f"{self.clicks}: {len(file.unconfirmed.ids)} of its clicks are unconfirmed; with --auto give only clicks that a "
                 "person placed"
             )
         reflector_m = checked_reflector_m(self.reflector_m)
@@ -265,6 +265,6 @@ def _placed_words(placed: "PlacedClicks") -> str:
         return agreement_text(placed.agreement)
     count = len(placed.unconfirmed.ids)
     return (
-        f"{count} {'click' if count == 1 else 'clicks'} placed that nobody confirmed (confidence "
+        f"{count} {'click' if count == 1 else 'clicks'} placed automatically, unconfirmed (confidence "
         f"{probability_text(placed.unconfirmed.confidence)}): {agreement_text(placed.agreement)}"
     )

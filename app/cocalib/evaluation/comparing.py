@@ -137,7 +137,7 @@ def comparison_lines(compared: ComparedOnRecording) -> tuple[str, ...]:
             for name, one in ((a, compared.a.residuals), (b, compared.b.residuals))
         )
         rows.append(
-            f"residuals: AED {lengths}; B - A {compared.residuals.mean:+.3g} px per placement"
+            f"residuals: mean reprojection error (AED) {lengths}; B - A {compared.residuals.mean:+.3g} px per placement"
             f"{_interval(compared.residuals, 1.0, 'px', 'placement')}"
         )
     if compared.acc is not None and compared.a.boxes is not None and compared.b.boxes is not None:
@@ -186,7 +186,7 @@ def _answer(compared: ComparedOnRecording) -> str:
 
 def _why_unknown(compared: ComparedOnRecording) -> str:
     if compared.residuals is None and compared.acc is None:
-        return "there is nothing to judge them by"
+        return "there are no clicks or boxes to evaluate against"
     told = {one.winner for one in (compared.residuals, compared.acc) if one is not None}
     if {"A", "B"} <= told and compared.fair:
         return "residuals and Acc contradict each other"

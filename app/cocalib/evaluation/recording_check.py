@@ -146,7 +146,7 @@ def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
     lost = far_outside(np.array([median_px]), calibration.camera)[0]
     seen = f"most of them {LOST_TEXT}" if lost else f"{median_px:.3g} px in the middle"
     if np.isfinite(calibration.metrics.aed_px):
-        seen += f" (AED when it was solved {calibration.metrics.aed_px:.3g} px)"
+        seen += f" (mean reprojection error when solved {calibration.metrics.aed_px:.3g} px)"
     residuals = f"residuals of {count} clicks on this recording: {seen}"
     if not np.isfinite(calibration.firm_covariance).all():
         holds, judged = median_px <= _NEAR_PX, f"the file states no uncertainty, so {_NEAR_PX:g} px decide"

@@ -223,7 +223,7 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     frames = clicks_at_frames(file.clicks, recording.image_times, source=source, others=recording.other_image_times)
     if file.unconfirmed is None:
         return frames
-    note = f"{source}: nobody confirmed {len(file.unconfirmed.ids)} of these clicks: look at each"
+    note = f"{source}: {len(file.unconfirmed.ids)} of these clicks are unconfirmed: confirm each"
     return dataclasses.replace(frames, notes=(*frames.notes, note))
 
 

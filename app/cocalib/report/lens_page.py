@@ -114,7 +114,7 @@ def _model_table(lens: CalibratedLens) -> Markup:
         )
         for trial in lens.trials
     ]
-    heads = ("model", "RMS [px]", "held out [px]", "worse by [px²]")
+    heads = ("model", "RMS [px]", "leave-one-out [px]", "worse by [px²]")
     return tag(
         "div", tag("h3", "Models"), _table("Models", heads, rows), tag("p", sentence(lens.choice), class_="note")
     )
@@ -132,7 +132,7 @@ def _view_table(lens: CalibratedLens) -> Markup:
         )
         for view in lens.views[:_MOST_ROWS]
     ]
-    heads = ("view", "corners used", "RMS [px]", "held out [px]", "blur [px]")
+    heads = ("view", "corners used", "RMS [px]", "leave-one-out [px]", "blur [px]")
     return tag("section", tag("h2", "Every view"), _table("Views", heads, rows), id="every-view")
 
 

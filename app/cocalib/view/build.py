@@ -152,7 +152,7 @@ def _status(session: Session, facts: RecordingFacts, reference: Reference | None
     asked = sum(pair.rival >= 0 and not pair.inlier and not pair.excluded for pair in found.pairs)
     changed = len({click.id for click in session.clicks} & session.changed_returns)
     told = (
-        f"{asked} ask{'s' if asked == 1 else ''} which return is right (C)" if asked else "",
+        f"{asked} pair{' needs' if asked == 1 else 's need'} a return (C)" if asked else "",
         "" if found.sees_elevation else firm_text(found),
         "1 click changed its return" if changed == 1 else f"{changed} clicks changed their return" if changed else "",
         "unconfirmed assumptions" if facts.unconfirmed(session) else "",
@@ -174,11 +174,11 @@ def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
     metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
     metrics = (*metrics, *_placements(calibration))
     figures = (*pose, *metrics) if assumed else (*metrics, *pose)
-    figures = tuple(replace(figure, label=figure.abbreviation or figure.label) for figure in figures)
+    figures = tuple(replace(figure, label=_full_label(figure)) for figure in figures)
     width = max(len(figure.label) for figure in figures)
     verdict = verdict_on(calibration)
     lines = ["verdict: " + verdict_line(verdict)]
-    lines += ["assuming: " + assumed_words(verdict.assumed)] if verdict.assumed else []
+    lines += ["assumes: " + assumed_words(verdict.assumed)] if verdict.assumed else []
     lines += ["next: " + sentence(action_words(verdict))]
     rows = [words(_line(figure, width)) for figure in figures]
     if assumed:
@@ -211,7 +211,11 @@ def _placements(calibration: Calibration) -> tuple[Figure, ...]:
     if not calibration.options.models_noise or not pairs:
         return ()
     count = len(linked_clicks(pairs, calibration.options))
-    return (Figure("placements", "at placements", f"{count}, each of which is one pair", "", ""),)
+    return (Figure("placements", "placements (pairs)", f"{count}", "", ""),)
+
+
+def _full_label(figure: Figure) -> str:
+    return f"{figure.label} ({figure.abbreviation})" if figure.abbreviation else figure.label
 
 
 def _line(figure: Figure, width: int) -> str:
@@ -268,7 +272,7 @@ def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placeme
         word="" if early else verdict.level,
         line=early or verdict_rest(verdict).with_degree_signs(),
         action=asked,
-        assumes=sentence("assuming " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
+        assumes=sentence("assumes " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
         kind=type(action).__name__,
         pairs=action.ids if isinstance(action, ReviewPairs | ChooseReturn) else (),
         key="" if worst else "N" if early and left else _key(verdict, session, left),
@@ -302,8 +306,8 @@ def _early_line(session: Session) -> Words:
     worst = _fits_worst(session)
     seems = words("two answers fit so far" if "two-poses" in grave else "looks consistent")
     if worst:
-        seems = say("{pair} fits worst", pair=named(worst))
-    return say("{count} of {needed} pairs, {seems}", count=len(used), needed=SURE_PAIRS, seems=seems)
+        seems = say("check {pair}", pair=named(worst))
+    return say("{count} of {needed} pairs; {seems}", count=len(used), needed=SURE_PAIRS, seems=seems)
 
 
 def _large_so_far(verdict: Verdict, session: Session) -> Words:
@@ -315,9 +319,9 @@ def _large_so_far(verdict: Verdict, session: Session) -> Words:
     if not all(pair.inlier for pair in pairs):
         return Words()
     worst = _fits_worst(session)
-    agree = say(", {pair} fits worst", pair=named(worst)) if worst else words(" agree")
+    agree = say("; check {pair}", pair=named(worst)) if worst else words(" agree")
     within = error_text(stated_error(outcome))
-    return say("{count} pairs{agree}: so far within {within}", count=len(pairs), agree=agree, within=within)
+    return say("{count} pairs{agree}; so far within {within}", count=len(pairs), agree=agree, within=within)
 
 
 def _fits_worst(session: Session) -> str:
@@ -370,6 +374,6 @@ def _advice_words(best: NextPlacement, verdict: Verdict) -> str:
     if isinstance(verdict.action, PlaceReflector):
         return ""
     if best.may_stop:
-        return "No further placement would reduce the pose uncertainty noticeably."
-    amount = f"by {100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
-    return f"A placement {placement_words(*best.position_radar_m[:2].tolist())}, would reduce the pose uncertainty {amount}."
+        return "Further placements would not help noticeably."
+    amount = f"{100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
+    return f"One more placement {placement_words(*best.position_radar_m[:2].tolist())}: {amount} less uncertainty."

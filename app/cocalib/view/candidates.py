@@ -108,9 +108,16 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     ordered = tuple(rows[i] for i in order)
     if better < 0:
         return PairCandidates(pair.id, session.revision, ordered)
-    how = "as well" if rival >= 0 else "better"
-    words = f"The return at {rows[better].words} fits this click {how}"
+    words = f"The {_choice(rows[better])} return fits better"
+    if rival >= 0:
+        words = "Which return? " + " or ".join(_choice(rows[i], percent=True) for i in (used, better) if i >= 0)
     return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
+
+
+def _choice(row: CandidateRow, *, percent: bool = False) -> str:
+    """Return a candidate in a few words: "25.1 m, 80 %"."""
+    likely = f", {100.0 * row.probability:.0f} %" if percent and row.probability is not None else ""
+    return f"{row.range_m:.1f} m{likely}"
 
 
 def _in_view(calibration: Calibration, candidates: Sequence[Candidate], used: int) -> list[Candidate]:

@@ -1,4 +1,4 @@
-"""The figures next to the image, each with one sentence, how the camera is mounted, and the errors that all pairs share."""
+"""The figures next to the image, each with one sentence, how the camera is mounted, and the systematic errors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,14 +21,14 @@ from cocalib.view.wording import plain, sentence, with_sigma
 
 _METRICS = {
     "aed": ("mean reprojection error", "AED"),
-    "held_out_aed": ("leave-one-out error", "held-out AED"),
+    "held_out_aed": ("leave-one-out reprojection error", ""),
     "cdsd": ("standard deviation", "CDSD"),
     "rms": ("root mean square", "RMS"),
     "inliers": ("clicks that agree", ""),
 }
 _NOT_YET = "Available after the first calibration."
 _HELD_OUT_RATIO = 1.5
-"""A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""
+"""A higher ratio of leave-one-out to fitted error means that the pose depends too much on single pairs."""
 
 
 def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
@@ -38,9 +38,9 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
     metrics = calibration.metrics
     hints = {
         "aed": f"Mean distance between click and reprojection over {metrics.n} pairs (paper: AED).",
-        "held_out_aed": "Mean distance when each pair is predicted from all the others: the error to expect at a new placement.",
+        "held_out_aed": "Mean distance when each pair is predicted from all the others: what to expect at a new placement.",
         "cdsd": "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
-        "rms": "Root mean square of these distances: large ones count more than in AED.",
+        "rms": "Root mean square of these distances: large ones count more than in the mean.",
     }
     figures = {
         key: Figure(
@@ -50,7 +50,7 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
     }
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
         held_out = figures["held_out_aed"]
-        warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
+        warning = "It is well above the mean reprojection error, so the pose depends on single pairs: add placements."
         figures["held_out_aed"] = replace(held_out, hint=f"{held_out.hint} {warning}", level="warning")
     used = sum(not pair.excluded for pair in calibration.pairs)
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
@@ -103,17 +103,14 @@ def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
     centimetres, sigmas_cm = 100 * mounting.position_m, 100 * position_sigma_m
     degrees, sigmas_deg = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
     return (
-        *(_directed(*row, "cm", of_position) for row in zip(_POSITION, centimetres, sigmas_cm, strict=True)),
-        *(_directed(*row, "°", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
+        *(_signed(*row, "cm", of_position) for row in zip(_POSITION, centimetres, sigmas_cm, strict=True)),
+        *(_signed(*row, "°", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
     )
 
 
-def _directed(what: tuple[str, str, str, str], value: float, sigma: float, unit: str, causes: str) -> Figure:
-    """Return a value without its sign, which its label says: "camera down 4.0", not "camera up -4.0"."""
-    key, positive, negative, hint = what
-    return Figure(
-        key, negative if value < 0 else positive, with_sigma(abs(float(value)), float(sigma)), unit, hint + causes
-    )
+def _signed(what: tuple[str, str, str], value: float, sigma: float, unit: str, causes: str) -> Figure:
+    key, label, hint = what
+    return Figure(key, label, with_sigma(float(value), float(sigma)), unit, hint + causes)
 
 
 def _image_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -164,18 +161,17 @@ _POSITION = (
     (
         "camera_x",
         "camera forward",
-        "camera back",
         f"Camera centre ahead of the radar or behind it, along its x axis, {_SIGMA}",
     ),
-    ("camera_y", "camera left", "camera right", f"Camera centre to the side of the radar, along its y axis, {_SIGMA}"),
-    ("camera_z", "camera up", "camera down", f"Camera centre above or below the radar, along its z axis, {_SIGMA}"),
+    ("camera_y", "camera left", f"Camera centre to the side of the radar, along its y axis, {_SIGMA}"),
+    ("camera_z", "camera up", f"Camera centre above or below the radar, along its z axis, {_SIGMA}"),
 )
 _ANGLES = (
-    ("roll", "roll to the right", "roll to the left", f"Camera tilted to its side, {_AHEAD}, {_SIGMA}"),
-    ("pitch", "pitch down", "pitch up", f"Camera looking down or up, {_AHEAD}, {_SIGMA}"),
-    ("yaw", "yaw left", "yaw right", f"Camera looking to the side, {_AHEAD}, {_SIGMA}"),
+    ("roll", "roll to the right", f"Camera tilted to its side, {_AHEAD}, {_SIGMA}"),
+    ("pitch", "pitch down", f"Camera looking down or up, {_AHEAD}, {_SIGMA}"),
+    ("yaw", "yaw left", f"Camera looking to the side, {_AHEAD}, {_SIGMA}"),
 )
-"""Key, label of a positive value, label of a negative one, explanation."""
+"""Key, label, which says what is positive, explanation."""
 
 
 OPTICAL_FROM_BODY: Matrix33 = frozen_array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], (3, 3))

@@ -1,4 +1,4 @@
-"""What the page says about a recording that is still being written: how far behind it is, and where the next placement pays."""
+"""What the page says about a recording that is still being written: how far behind it is, and the best next placement."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -50,14 +50,14 @@ def pace_words(pace: Pace) -> str:
 
 
 def advice_words(coverage: Coverage, best: NextPlacement | None) -> str:
-    """Say how many placements there are and where the next one pays, in one sentence.
+    """Say how many placements there are and where the next one helps most, in one sentence.
 
     Args:
         coverage: of the placements that the radar shows.
         best: from the calibration; None without one.
     """
     if best is not None and best.may_stop:
-        return f"{_count(coverage.placements)}: no further one would reduce the pose uncertainty noticeably."
+        return f"{_count(coverage.placements)}: further ones would not help noticeably."
     if best is not None:
         return f"{_count(coverage.placements)}; next: {placement_words(*best.position_radar_m[:2].tolist())}."
     if coverage.next is not None:

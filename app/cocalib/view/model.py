@@ -112,12 +112,12 @@ class ClickRow:
 
 @dataclass(frozen=True, slots=True)
 class SystematicErrorRow:
-    """One error that all pairs share, as a row of a table.
+    """One systematic error, as a row of a table.
 
     Attributes:
         figure: its value, a dash if the pairs do not determine it; what would reduce it is in the hint; a warning if it makes
             up a third or more of the variance of position or rotation.
-        prior: its standard deviation before any pair, in the same unit.
+        prior: its prior standard deviation, in the same unit.
         position_percent: its part of the variance of the position.
         rotation_percent: the same of the rotation.
     """
@@ -130,7 +130,7 @@ class SystematicErrorRow:
 
 @dataclass(frozen=True, slots=True)
 class SystematicErrorTable:
-    """The errors that all pairs share.
+    """The systematic errors.
 
     Attributes:
         rows: those that matter, the largest first.
@@ -239,7 +239,7 @@ class View:
     Attributes:
         revision: of the session; grows with every change.
         stage: how far the session has come.
-        status: what the status line says besides: "2 ask which return is right (C)"; or of the calibration under review.
+        status: what the status line says besides: "2 pairs need a return (C)"; or of the calibration under review.
         solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
         checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
         solved_revision: the revision that the figures belong to; -1 without figures.
@@ -251,7 +251,7 @@ class View:
         metrics: how well the pairs agree.
         pose: the camera's position and angles relative to the radar, and the uncertainty in the image.
         pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
-        systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
+        systematic_errors: the systematic errors, and their parts in the uncertainty.
         warnings: of the latest outcome, the gravest first.
         options: the current ones; changes are sent as a part of this tree.
         residual_limit_px: residuals above this should be checked; None without a calibration.

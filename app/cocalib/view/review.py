@@ -132,8 +132,8 @@ def _words(calibration: Calibration) -> Words:
     influences = [(pair.influence, pair.id) for pair in calibration.pairs if np.isfinite(pair.influence)]
     if influences:
         most, name = max(influences)
-        leans = "The pose leans most on {pair}: leaving it out moves it by {most} standard deviations."
-        said.append(say(leans, pair=named(name), most=plain(most, 2)))
+        matters = "{pair} matters most: without it the pose moves {most} σ."
+        said.append(say(matters, pair=named(name), most=plain(most, 2)))
     return join(said)
 
 
@@ -228,32 +228,32 @@ def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: boo
 def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values) -> str:
     """Say what decided between the candidates."""
     chosen = pair.candidate
-    place = f"{np.linalg.norm(candidates[chosen].position_radar_m):.2f} m"
+    used = f"the {np.linalg.norm(candidates[chosen].position_radar_m):.2f} m return"
     if pair.measured is not None and pair.measured.chosen is not None:
-        return f"Uses the return at {place} because it was chosen by hand, {plain(distances_px[chosen])} px from the click."
+        return f"Uses {used}: chosen by hand, {plain(distances_px[chosen])} px from the click."
     if len(candidates) == 1:
-        return f"Uses the return at {place}, the only static one that stands out in its window."
+        return f"Uses {used}: the only static one that stands out in its window."
     others = [i for i in range(len(candidates)) if i != chosen]
     near = min(others, key=lambda i: distances_px[i] if np.isfinite(distances_px[i]) else np.inf)
     best = max(others, key=lambda i: candidates[i].score)
     count, own_px, next_px = len(candidates), distances_px[chosen], distances_px[near]
     fits = own_px <= next_px or not np.isfinite(next_px)
     scores = candidates[chosen].score >= candidates[best].score
-    away = f"{plain(own_px)} px from the click under the pose, the next {plain(next_px)} px"
+    away = f"{plain(own_px)} px from the click; the next is at {plain(next_px)} px"
     if not np.isfinite(own_px):
-        return f"Uses the return at {place} of {count} candidates, though the camera would not see it there."
+        return f"Uses {used} of {count}, though the camera would not see it there."
     if fits and scores:
-        return f"Uses the return at {place} of {count} candidates: the most plausible by the radar, and {away}."
+        return f"Uses {used}: best of {count}, {away}."
     if fits:
         clear = "clearly " if next_px > _MUCH_CLOSER * own_px else ""
         return (
-            f"Uses the return at {place} of {count} candidates: it is {clear}the nearest ({away}), though the radar alone "
-            f"prefers the one at {np.linalg.norm(candidates[best].position_radar_m):.2f} m."
+            f"Uses {used}: {clear}the nearest of {count}, {away}. The radar alone prefers the one at "
+            f"{np.linalg.norm(candidates[best].position_radar_m):.2f} m."
         )
     nearest_m = np.linalg.norm(candidates[near].position_radar_m)
     return (
-        f"Uses the return at {place} of {count} candidates, {plain(own_px)} px from the click; the one at {nearest_m:.2f} m is "
-        f"nearer ({plain(next_px)} px), but less plausible by the radar, or less certain."
+        f"Uses {used} of {count}, {plain(own_px)} px from the click. The one at {nearest_m:.2f} m is nearer "
+        f"({plain(next_px)} px), but less plausible by the radar, or less certain."
     )
 
 
@@ -267,7 +267,7 @@ def _facts(pair: PairResult) -> tuple[Figure, ...]:
         ),
         Figure(
             "held_out",
-            "held out",
+            "leave-one-out",
             *_with_unit(pair.held_out_px, "px"),
             "The same under the pose that the other pairs give.",
         ),
@@ -275,7 +275,7 @@ def _facts(pair: PairResult) -> tuple[Figure, ...]:
             "outlier_probability",
             "outlier probability",
             *_with_unit(100.0 * pair.outlier_probability, "%", 2),
-            "Probability that click and return do not belong together, judged by the other pairs.",
+            "Probability that click and return do not belong together, by the other pairs.",
         ),
         Figure(
             "influence",

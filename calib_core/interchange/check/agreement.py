@@ -125,7 +125,7 @@ def _change_text(change: PoseChange) -> str:
 def noticed_text(change: PoseChange, level: float) -> str:
     """Return what change a test at this level would have noticed, from the most to the least visible axis."""
     deg, cm = (f"{part.min():.2g} to {part.max():.2g}" for part in np.split(change.noticeable(level), 2))
-    return f"would have noticed {deg} deg or {cm} cm, by axis"
+    return f"detectable change (95 % power): {deg} deg or {cm} cm, by axis"
 
 
 def _lens_text(lens: LensDifference) -> str:
@@ -446,7 +446,7 @@ def by_other_calibration(
         CheckResult(
             "error",
             "disagrees",
-            f"{difference}; {judgement.text}, and no known slip explains it",
+            f"{difference}; {judgement.text}, not explained by a convention error",
             "the sensors moved, or one of the two is wrong",
         ),
         *lens,

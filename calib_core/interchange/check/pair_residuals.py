@@ -141,7 +141,10 @@ def _by_pose(pose: WrittenPose, pairs: CheckPairs, camera: Camera | None) -> Che
     if undone is not None:
         return explained(undone, mismatch)
     return CheckResult(
-        "error", "pairs-missed", f"{mismatch}, and no known slip explains it", "the sensors moved, or the pose is wrong"
+        "error",
+        "pairs-missed",
+        f"{mismatch}, not explained by a convention error",
+        "the sensors moved, or the pose is wrong",
     )
 
 

@@ -117,7 +117,7 @@ class CheckReport:
         rows += [f"note: {note}" for note in self.imported.notes]
         stated = self.imported.file.verdict if self.imported.file is not None else None
         if stated is not None and stated.level != "contradictory":  # which is a result
-            rows.append(f"verdict when it was solved: {stated.line}")
+            rows.append(f"stored verdict: {stated.line}")
         for result in self.results:
             rows.append(f"{_label(result)}: {result.message}" + (f"; {result.hint}" if result.hint else ""))
         if self.comparison is not None:
@@ -351,7 +351,7 @@ def by_check_point(
     return CheckResult(
         "error",
         CHECK_POINT_MISSED,
-        f"{mismatch}, and no known slip explains it",
+        f"{mismatch}, not explained by a convention error",
         "the numbers were changed; export the file again",
     )
 
@@ -456,7 +456,7 @@ def _by_pose(imported: ImportedCalibration, origin: ImportedCalibration) -> Chec
     return CheckResult(
         "error",
         "other-pose",
-        f"{difference}, and no known slip explains it",
+        f"{difference}, not explained by a convention error",
         "it is not this calibration's file, or was changed: export it again",
     )
 

@@ -113,8 +113,8 @@ def test_dwells_without_images_or_changes_say_so():
     same = replace(drawn.views[1], candidates=())
     proposals = proposals_of([dark, same, *drawn.views[2:]], drawn.camera, OPTIONS)
     reasons = {placement.start: reason for placement, reason in proposals.unproposed}
-    assert "no frame" in reasons[dark.placement.start]
-    assert "nothing of" in reasons[same.placement.start]
+    assert "frame" in reasons[dark.placement.start]
+    assert "change" in reasons[same.placement.start]
 
 
 def test_the_nominal_mounting_is_where_the_search_starts():
@@ -188,7 +188,7 @@ def test_a_fairly_sure_proposal_says_when_its_apex_is_not_seen():
     found = [one for seed in range(4) for one in proposed(draw_views(seed, Drawing(count=7))).ranked]
     fairly = [one for one in found if 0.8 <= one.confidence < 0.9]
     assert fairly
-    assert all("not seen clearly" in one.reason for one in fairly)
+    assert all("blurred" in one.reason for one in fairly)
 
 
 # Proposals as JSON: valid, the same each time, and with ids that confirming does not change.

@@ -50,7 +50,7 @@ def test_a_calibration_prints_as_nine_lines(simulated, method):
         "one sigma",
         "systematic",
         "AED",
-        "held-out",
+        "leave-one-out",
         "warnings",
         "next",
     ):

@@ -61,7 +61,7 @@ def _verdict(subject: ReportSubject) -> Markup:
         tag(
             "div",
             tag("p", sentence(reason)),
-            *([tag("p", tag("b", "Assuming: "), sentence(assumes))] if assumes else []),
+            *([tag("p", tag("b", "Assumes: "), sentence(assumes))] if assumes else []),
             tag("p", tag("b", "Next: "), sentence(action), class_="next"),
         ),
         class_=f"verdict {level.split()[0]}",
@@ -222,8 +222,8 @@ def _figures(calibration: Calibration) -> Markup:
         rows.append(("in the image (1 sigma, pose)", f"± {plain(metrics.picture_sigma_px, 2)} px"))
     either = aed_either_way(CalibrationFile(calibration))
     if differ := either is not None and plain(either[0]) != plain(either[1]):
-        rows.insert(1, ("AED without the corrections", f"{plain(either[1])} px"))
-    note = "Corrections: what the radar gets wrong, which only calibration-1 can hold."
+        rows.insert(1, ("mean reprojection error (AED) without the corrections", f"{plain(either[1])} px"))
+    note = "Corrections: radar biases, which only calibration-1 can hold."
     return tag("div", heading, _table(("figure", "value"), rows), tag("p", note, class_="note") if differ else None)
 
 

@@ -18,7 +18,7 @@ _HEADS = (
     "residual u px",
     "v px",
     "length px",
-    "held-out px",
+    "leave-one-out px",
     "wrong with p",
     "influence",
     "state",

@@ -17,7 +17,7 @@ _RESTS_ON = {
     "clicked": "clicks: solved from pairs of radar positions and clicked pixels",
     "imported_proven": "an import whose meaning a check point, pairs or another calibration proved",
     "imported_assumed": "an import whose meaning is assumed",
-    "automatic": "clicks that were placed automatically and that nobody confirmed",
+    "automatic": "automatic, unconfirmed clicks",
 }
 
 

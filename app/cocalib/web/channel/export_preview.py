@@ -32,7 +32,7 @@ _EVIDENCE: dict[Evidence, str] = {
     "clicked": "Rests on clicks",
     "imported_proven": "Imported; a check point, pairs or another calibration proved what its numbers mean",
     "imported_assumed": "Imported; what its numbers mean was assumed, nothing proves it",
-    "automatic": "Rests on clicks that were placed automatically; nobody confirmed them",
+    "automatic": "Rests on automatic, unconfirmed clicks",
 }
 
 

@@ -42,7 +42,7 @@ def test_the_advice_does_not_repeat_the_action_of_the_verdict():
     advice, verdict = advised(calibration), verdict_on(calibration)
     assert advice is not None
     assert isinstance(verdict.action, ReduceError)
-    assert advice.words.startswith("A placement ")
+    assert advice.words.startswith("One more placement ")
 
 
 def test_the_papers_method_gives_no_advice_since_it_has_no_covariance():

@@ -90,7 +90,7 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat):
 def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calibration):
     count = len(calibration.pairs)
     lines = tuple(map(str, summary_lines(calibration)))
-    counted = [re.findall(r"\d+", line) for line in lines if line.startswith(("clicks that", "at placements"))]
+    counted = [re.findall(r"\d+", line) for line in lines if line.startswith(("clicks that", "placements (pairs)"))]
     assert counted == [[str(count)] * 2, [str(count)]]
 
 

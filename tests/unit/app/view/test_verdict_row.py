@@ -77,8 +77,8 @@ MIRRORED = DataWarning.reported("mirrored-axes", "an axis is mirrored", "turn it
 @pytest.mark.parametrize(
     ("pairs", "warnings", "line"),
     [
-        (FIVE, (), "5 of 8 pairs, looks consistent"),
-        (FIVE, (TWO_POSES,), "5 of 8 pairs, two answers fit so far"),
+        (FIVE, (), "5 of 8 pairs; looks consistent"),
+        (FIVE, (TWO_POSES,), "5 of 8 pairs; two answers fit so far"),
         ((*FIVE[:4], pair("c5", inlier=False)), (), ""),
         (FIVE, (MIRRORED,), ""),
     ],

@@ -1,5 +1,6 @@
 """What the screen shows for a session: texts, figures, rows, ellipses."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -108,7 +109,7 @@ def test_a_click_that_two_returns_fit_asks_for_one_of_them():
     assert not any(str(line).startswith("disagrees") for line in summary_lines(outcome))
     offered = click_candidates(advance(clicked(5), Solved(5, outcome), FACTS).present, ASKING.measured)
     assert offered.rows[offered.suggested].position_m == BEHIND_M
-    assert "as well" in offered.suggestion
+    assert re.findall(r"[\d.]+ m", offered.suggestion) == ["6.0 m", "7.2 m"]
 
 
 def test_a_return_that_the_camera_does_not_see_is_not_offered_unless_it_is_in_use():
@@ -266,13 +267,7 @@ def test_a_figure_that_was_not_computed_is_a_dash_and_one_that_warns_stands_out(
 
 def test_a_pose_without_covariance_is_shown_without_one():
     seen = shown(5, calibration(*FIVE, covariance=np.full((6, 6), NAN)))
-    assert [figure.value for figure in seen.pose] == ["5.00", "10.0", "30.0", "0", "0", "0"]
-
-
-def test_a_direction_is_a_word_and_not_a_sign():
-    seen = shown(5, calibration(*FIVE))
-    assert [one.label for one in seen.pose][:3] == ["camera forward", "camera right", "camera up"]
-    assert not any(one.value.startswith("-") for one in seen.pose)
+    assert [figure.value for figure in seen.pose] == ["5.00", "-10.0", "30.0", "0", "0", "0"]
 
 
 def test_the_residual_limit_is_the_usual_ellipse_or_ransacs_threshold():
@@ -289,8 +284,8 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
         unpaired=(Unpaired.reported("c9", "no-scan", "lost", "wait"),),
     )
     lines = tuple(map(str, summary_lines(outcome)))
-    assert [line.partition(":")[0] for line in lines[:3]] == ["verdict", "assuming", "next"]
-    assert lines[3] == "AED                12.4 px"
+    assert [line.partition(":")[0] for line in lines[:3]] == ["verdict", "assumes", "next"]
+    assert lines[3].split()[-3:] == ["(AED)", "12.4", "px"]
     assert lines[-2:] == ("warning: B. C.", "unpaired: c9: Lost. Wait.")
 
 
