@@ -116,16 +116,6 @@ def rotation_from_euler(x_rad: float, y_rad: float, z_rad: float) -> Matrix33:
     return about_z @ about_y @ about_x
 
 
-def euler_from_rotation(rotation: Matrix33) -> Vector3:
-    """Return the angles (x, y, z) [rad] with rotation = Rz(z) Ry(y) Rx(x), y from -pi/2 to pi/2; z is 0 where y is +-pi/2."""
-    r = np.asarray(rotation, dtype=np.float64)
-    cosine_y = float(np.hypot(r[0, 0], r[1, 0]))
-    y_rad = np.arctan2(-r[2, 0], cosine_y)
-    if cosine_y < 1e-9:  # only the sum or the difference of x and z is defined
-        return np.array([np.arctan2(-r[1, 2], r[1, 1]), y_rad, 0.0])
-    return np.array([np.arctan2(r[2, 1], r[2, 2]), y_rad, np.arctan2(r[1, 0], r[0, 0])])
-
-
 def _dot(x: list[float], y: list[float]) -> float:
     """Multiply two rows of three: scalars, which for a single small matrix are much faster than NumPy."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]

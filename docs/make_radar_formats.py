@@ -4,12 +4,13 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from calib_core.recordings.plain_files.tables.text_tables import csv_columns
-from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE
+from calib_core.recordings.field_words import SPELLINGS, TABLE_ANGLES, units_for
+from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE, TIME_SPELLINGS
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind, plan_for
 from calib_core.recordings.time.written_times import DATE_SPELLINGS
 
 PAGE = Path(__file__).parent / "radar-formats.md"
+_SHOWN_SPELLINGS = 18
 _KINDS: dict[MessageKind, str] = {
     "cloud": "Clouds: sensor_msgs/PointCloud2",
     "channels": "Clouds: sensor_msgs/PointCloud",
@@ -29,7 +30,7 @@ def with_tables(page: str) -> str:
     ]
     page = _replaced(page, "## Notes\n\n", r"(?:\*.*\n)*", notes)
     page = _replaced(page, "These are one moment:\n\n", r"(?:\*.*\n)*", [f"* `{date}`" for date in DATE_SPELLINGS])
-    page = _replaced(page, "| quantity | spellings | units |\n|---|---|---|\n", r"(?:\|.*\n)*", csv_columns())
+    page = _replaced(page, "| quantity | spellings | units |\n|---|---|---|\n", r"(?:\|.*\n)*", _columns())
     return _replaced(page, "of a CSV names columns and units: ", r".*\n", [f"`{TABLE_EXAMPLE}` |"])
 
 
@@ -38,6 +39,26 @@ def _replaced(page: str, before: str, old: str, lines: Iterable[str]) -> str:
     assert page.count(before) == 1, before
     new = "".join(f"{line}\n" for line in lines)
     return re.sub(re.escape(before) + old, lambda _: before + new, page)
+
+
+def _columns() -> tuple[str, ...]:
+    """Return the rows of quantities, spellings and units of tables."""
+    known: dict[str, list[str]] = {}
+    for one in (*SPELLINGS, *TABLE_ANGLES):
+        known.setdefault({"longitudinal": "x", "lateral": "y", "radial": "doppler"}.get(one.kind, one.kind), []).append(
+            one.words
+        )
+    sigma = {f"sigma_{q}": [f"sigma {q}", f"{q} std", f"{q} accuracy"] for q in ("range", "azimuth", "elevation")}
+    order = ("x", "y", "z", "range", "azimuth", "elevation", "doppler", "vx", "vy", "vz", "snr", "rcs", "power", "amplitude",
+             "intensity")  # fmt: skip
+    rows = []
+    for quantity, spellings in {**TIME_SPELLINGS, **{name: known[name] for name in order}, **sigma}.items():
+        units = {"time": "ns, us, ms, s, or dates"}.get(quantity, "")
+        if not units and quantity not in TIME_SPELLINGS:
+            units = ", ".join(unit.flag for unit in units_for(quantity))
+        names = ", ".join(f"`{spelling}`" for spelling in spellings[:_SHOWN_SPELLINGS])
+        rows.append(f"| {quantity} | {names} | {units} |")
+    return tuple(rows)
 
 
 def _table(decoders: list[Decoder]) -> list[str]:

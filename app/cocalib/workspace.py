@@ -21,7 +21,7 @@ from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.session.applying import History, advance, settled
-from cocalib.session.events import ClicksImported, Redo, ScansAdded, Solved, Step, Undo
+from cocalib.session.events import ClicksImported, ScansAdded, Solved, Step
 from cocalib.session.file.session_file import Closed, Restored, open_session_file
 from cocalib.session.state import AssumedReading, ChosenIntrinsics, RecordingFacts, Session
 from cocalib.solving.worker import SolverWorker
@@ -222,14 +222,6 @@ class Workspace:
         reach_ns = round((locating.window_s / 2 + locating.max_time_gap_s) * NS_PER_S)
         if scans_from is not None and any(click.image_time + reach_ns >= scans_from for click in session.clicks):
             self.dispatch(ScansAdded())
-
-    def undo(self) -> None:
-        """Undo the last change, if there is one."""
-        self.dispatch(Undo())
-
-    def redo(self) -> None:
-        """Redo the change that was undone last, if there is one."""
-        self.dispatch(Redo())
 
     def subscribe(self, subscriber: Subscriber) -> Callable[[], None]:
         """Call the subscriber with the current View, and again after every change.

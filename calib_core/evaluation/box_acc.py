@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Points3, TimesNs, Values, Vector3
 from calib_core.camera import Camera
-from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
+from calib_core.evaluation.counted_returns import CountedReturns
 from calib_core.evaluation.figures import (
     Axis,
     BoxedReturns,
@@ -18,10 +18,8 @@ from calib_core.evaluation.figures import (
     Share,
     edges_of,
 )
-from calib_core.evaluation.moving_returns import TargetOptions
-from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import NS_PER_S, Boxes, RadarScans, ReturnLabels, TimeNs
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import RadarErrors
 
 ANGLES_DEG = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
@@ -36,43 +34,6 @@ _CHANCE_DEG = 10.0
 _GROUPS_S = (1.0, 2.0, 5.0, 10.0)
 _LEAST_GROUPS = 6
 _MARGIN = 1.1  # of the angle from the axis to the corner of the image
-
-
-def box_figures(
-    camera_from_radar: RigidTransform,
-    camera: Camera,
-    scans: RadarScans,
-    boxes: Boxes,
-    *,
-    labels: ReturnLabels | None = None,
-    targets: Sequence[TargetTrack] | None = None,
-    radar_errors: RadarErrors | None = None,
-    classes: Sequence[str] = (),
-    max_gap_s: float | None = None,
-    options: TargetOptions | None = None,
-) -> BoxFigures:
-    """Compute Acc of a pose on a recording, with what stands behind it.
-
-    Args:
-        camera_from_radar: the pose that is judged.
-        camera: the lens.
-        scans: of the recording.
-        boxes: of its frames.
-        labels: the true origin of each return, which then decides instead of the radar's own targets.
-        targets: what `moving_targets` found; None searches the scans.
-        radar_errors: of the radar, taken out before the projection.
-        classes: count only targets of these classes; all if empty.
-        max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
-        options: of the search for targets.
-
-    Raises:
-        InputError: the boxes are of another recording, or no class matches.
-    """
-    if labels is None and targets is None:
-        targets = moving_targets(scans, options)
-    found = labels if labels is not None else targets or ()
-    counted = counted_returns(camera, scans, boxes, found, classes=classes, max_gap_s=max_gap_s)
-    return judged_by_boxes(camera_from_radar, camera, counted, radar_errors=radar_errors)
 
 
 def judged_by_boxes(

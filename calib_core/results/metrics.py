@@ -54,20 +54,6 @@ def rms(distances_px: Values) -> float:
     return float(np.sqrt(np.square(values).sum() / len(values))) if len(values) else float("nan")
 
 
-def inside_boxes(pixels_px: Points2, boxes_px: np.ndarray) -> Flags:
-    """Return which pixels (n,) lie within at least one detection box, edges included. A NaN pixel lies in none.
-
-    Args:
-        pixels_px: (n, 2) reprojected radar returns of one frame.
-        boxes_px: (m, 4) left, top, right, bottom of that frame's boxes [px].
-    """
-    pixels = np.asarray(pixels_px, dtype=np.float64).reshape(-1, 1, 2)
-    boxes = np.asarray(boxes_px, dtype=np.float64).reshape(1, -1, 4)
-    with np.errstate(invalid="ignore"):
-        within = (pixels >= boxes[..., :2]) & (pixels <= boxes[..., 2:])
-    return np.any(np.all(within, axis=2), axis=1)
-
-
 def acc(inside: Sequence[Flags], *, zero_frames: ZeroFrames = "keep") -> float | None:
     """Return the share of reprojected radar returns that fall within detection boxes, averaged over frames (paper, Acc).
 
@@ -76,7 +62,7 @@ def acc(inside: Sequence[Flags], *, zero_frames: ZeroFrames = "keep") -> float |
     calibration that misses half of the frames entirely would still score 100 %. Zero frames are kept by default.
 
     Args:
-        inside: per frame, the (n,) flags of inside_boxes.
+        inside: per frame, (n,) which returns lie in a box.
         zero_frames: "keep" them, or "drop" them to compare with the published figures.
 
     Returns:

@@ -117,7 +117,8 @@ def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatc
     """At most 40,000 words without what a program writes: whole pages, rows of a registry, and shown output."""
     monkeypatch.setattr("calib_core.interchange.formats.registry.FORMATS", ())
     monkeypatch.setattr("calib_core.recordings.radar.registry.DECODERS", ())
-    monkeypatch.setattr("calib_core.recordings.plain_files.tables.text_tables.csv_columns", list)
+    monkeypatch.setattr("calib_core.recordings.field_words.SPELLINGS", ())
+    monkeypatch.setattr("calib_core.recordings.field_words.TABLE_ANGLES", ())
     makers = {
         "formats": ("make_formats_table", "with_table"),
         "radar-formats": ("make_radar_formats", "with_tables"),

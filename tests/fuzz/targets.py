@@ -29,7 +29,7 @@ from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
-from calib_core.recordings.time.written_times import read_time, time_from_name
+from calib_core.recordings.time.written_times import epoch_in_name, read_time
 from cocalib.session.applying import History, advance, settled
 from cocalib.session.events import ClickExcluded, ClickPlaced, ClicksImported, Undo
 from cocalib.session.file.guarded_folder import SessionFileError
@@ -272,7 +272,7 @@ def _words(data: bytes, _folder: Path) -> None:
     text = data.decode("utf-8", "replace")
     for read in (lambda: parse_column_map([text]), lambda: parse_radar_axes(text), lambda: read_time(text)):
         _swallow(read)
-    time_from_name(text)
+    epoch_in_name(text)
 
 
 def _messages(data: bytes, _folder: Path) -> None:

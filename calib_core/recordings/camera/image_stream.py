@@ -21,10 +21,6 @@ _SAMPLED_FRAMES = 64
 _SHOWN_TIMES = 3
 
 
-def _no_layouts() -> dict[int, ImageLayout]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageStream:
     """The frames of one image topic, read one at a time.

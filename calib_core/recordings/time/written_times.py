@@ -159,18 +159,10 @@ def span_text(seconds: float) -> str:
     return f"{seconds:.3f} s"
 
 
-def time_from_name(stem: str) -> TimeNs | None:
+def epoch_in_name(stem: str) -> WrittenMoment | None:
     """Find the time since 1970 in a file's name: 19 digits are ns, 16 us, 13 ms, 10 s, with a fraction or without.
 
     If a name has several numbers, the last one that is a time between 2001 and 2100 is used.
-    """
-    moment = epoch_in_name(stem)
-    return moment.time if moment is not None else None
-
-
-def epoch_in_name(stem: str) -> WrittenMoment | None:
-    """Find the time since 1970 in a file's name, as time_from_name does, with its digits after the second.
-
     Ten digits may be followed by a point and a fraction, or by an underscore or dash and digits whose meaning is open.
     """
     found = None

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.evaluation.box_acc import box_figures
 from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.interchange.calibration_file import CalibrationFile
@@ -26,6 +25,7 @@ from cocalib.view.build import view
 from cocalib.view.reference import Reference
 from cocalib.view.wording import plain, with_sigma
 from cocalib.web.messages.outgoing import encode
+from tests.box_figures import box_figures
 from tests.street_recording import StreetRecording, reference_calibration
 
 

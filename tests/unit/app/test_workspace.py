@@ -13,7 +13,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, Unsolvable
 from cocalib.session.applying import EventError, History
-from cocalib.session.events import ClickPlaced, ClickRemoved, IntrinsicsChosen, OptionsChanged, Solved, Step, Undo
+from cocalib.session.events import ClickPlaced, ClickRemoved, IntrinsicsChosen, OptionsChanged, Redo, Solved, Step, Undo
 from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.session_file import Closed, Restored
 from cocalib.session.state import ChosenIntrinsics, RecordingFacts
@@ -111,8 +111,8 @@ def test_undo_and_redo_and_the_whole_of_the_options_are_journalled_and_answers_a
     workspace.dispatch(CLICK)
     workspace.dispatch(Solved(2, NO_ANSWER))
     for _ in range(3):  # the last has nothing to undo
-        workspace.undo()
-    workspace.redo()
+        workspace.dispatch(Undo())
+    workspace.dispatch(Redo())
     assert [type(step).__name__ for step in journal.steps[1:]] == ["ClickPlaced", "Undo", "Undo", "Redo"]
 
 
@@ -121,7 +121,7 @@ def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(w
     workspace.dispatch(CLICK)
     workspace.dispatch(Solved(2, NO_ANSWER))
     workspace.dispatch(ClickPlaced(TIMES[4], (1.0, 2.0), "clicked"))
-    workspace.undo()
+    workspace.dispatch(Undo())
     assert solver.revisions == [2, 3]
 
 
@@ -229,8 +229,8 @@ def test_downloaded_clicks_can_be_imported_again(workspace):
         workspace.dispatch(ClickPlaced(TIMES[frame], (1.5, 2.5), "clicked"))
     text, clicks = workspace.clicks_text(), workspace.session.clicks
     assert read_clicks(text) == clicks
-    workspace.undo()
-    workspace.undo()
+    workspace.dispatch(Undo())
+    workspace.dispatch(Undo())
     workspace.import_clicks(text, "clicks.json")
     assert workspace.session.clicks == clicks
     workspace.dispatch(Undo())
@@ -309,5 +309,5 @@ def test_clicks_are_solved_again_when_scans_of_their_windows_come(workspace, sol
     workspace.extend(FACTS.image_times, last)
     assert solver.revisions == [1, 2]
     assert [type(step).__name__ for step in journal.steps] == ["ClickPlaced"]
-    workspace.undo()
+    workspace.dispatch(Undo())
     assert workspace.session.clicks == ()

@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation.box_acc import box_figures, grouped_error, judged_by_boxes
+from calib_core.evaluation.box_acc import grouped_error, judged_by_boxes
 from calib_core.evaluation.counted_returns import counted_returns, renamed_classes
 from calib_core.evaluation.target_tracking import moving_targets
 from calib_core.geometry import RigidTransform
@@ -21,6 +21,7 @@ from calib_core.measurements import (
     ReturnLabels,
     TimeNs,
 )
+from tests.box_figures import box_figures
 from tests.independent_acc import acc as independent_acc
 from tests.scans import scan_of
 from tests.street import CAMERA, OPTICAL_FROM_RADAR, TRUE_POSE, Street, street, turned

@@ -9,7 +9,6 @@ from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.evaluation.box_acc import box_figures
 from calib_core.evaluation.figures import ResidualFigures, edges_of, spreads
 from calib_core.evaluation.paired_difference import acc_difference, residual_difference
 from calib_core.evaluation.residuals import associated_pairs, held_out, residual_figures, residual_test
@@ -19,6 +18,7 @@ from calib_core.measurements import NS_PER_S, Pair, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
 from calib_core.results.metrics import metrics_of
+from tests.box_figures import box_figures
 from tests.street import CAMERA, OPTICAL_FROM_RADAR, TRUE_POSE, street, turned
 
 PINHOLE = Camera("pinhole", 200, 100, np.array([[100.0, 0.0, 100.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]]))

@@ -17,9 +17,9 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
-from calib_core.recordings.field_words import SPELLINGS, TABLE_ANGLES, unit_of_word, units_for
+from calib_core.recordings.field_words import unit_of_word
 from calib_core.recordings.plain_files.source import PlainOptions
-from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE, TIME_SPELLINGS, TimeReader, time_name
+from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE, TimeReader, time_name
 from calib_core.recordings.radar.column_guess import table_meaning, unknown_unit
 
 _SEPARATORS = (",", ";", "\t", "|", " ")
@@ -29,7 +29,6 @@ _COMMENT = re.compile(r"\s*(?:#|%|//)")
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
 _SAMPLED_ROWS = 2000
-_SHOWN_SPELLINGS = 18
 _COMMENTS = ("#", "%")
 _SUSPECT = frozenset({"", " ", "\t", *_COMMENTS})
 _WRITTEN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
@@ -222,26 +221,6 @@ def _uses_commas(rows: Sequence[tuple[int, Sequence[str]]]) -> bool:
     return any(_COMMA_NUMBER.fullmatch(cell) for cell in cells) and not any(
         re.fullmatch(r"[+-]?\d+\.\d+", cell) for cell in cells
     )
-
-
-def csv_columns() -> tuple[str, ...]:
-    """Return the table rows of columns and units for the documentation."""
-    known: dict[str, list[str]] = {}
-    for one in (*SPELLINGS, *TABLE_ANGLES):
-        known.setdefault({"longitudinal": "x", "lateral": "y", "radial": "doppler"}.get(one.kind, one.kind), []).append(
-            one.words
-        )
-    sigma = {f"sigma_{q}": [f"sigma {q}", f"{q} std", f"{q} accuracy"] for q in ("range", "azimuth", "elevation")}
-    order = ("x", "y", "z", "range", "azimuth", "elevation", "doppler", "vx", "vy", "vz", "snr", "rcs", "power", "amplitude",
-             "intensity")  # fmt: skip
-    rows = []
-    for quantity, spellings in {**TIME_SPELLINGS, **{name: known[name] for name in order}, **sigma}.items():
-        units = {"time": "ns, us, ms, s, or dates"}.get(quantity, "")
-        if not units and quantity not in TIME_SPELLINGS:
-            units = ", ".join(unit.flag for unit in units_for(quantity))
-        names = ", ".join(f"`{spelling}`" for spelling in spellings[:_SHOWN_SPELLINGS])
-        rows.append(f"| {quantity} | {names} | {units} |")
-    return tuple(rows)
 
 
 def require_header(table: TextTable, options: PlainOptions) -> None:

@@ -12,7 +12,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording, recording_summary
-from calib_core.recordings.time.written_times import read_time, time_from_name
+from calib_core.recordings.time.written_times import epoch_in_name, read_time
 
 START_NS = 1_700_000_000 * NS_PER_S
 
@@ -59,7 +59,8 @@ def refusal(*paths: Path, **options: str) -> str:
     ],
 )
 def test_times_are_found_in_names(stem, expected):
-    assert time_from_name(stem) == expected
+    moment = epoch_in_name(stem)
+    assert (moment and moment.time) == expected
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView, ModelTrial
 from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.results import DataWarning
+from cocalib.session.events import Undo
 from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.lens import LensDesk, camera_table, lens_result, view_corners
 from cocalib.web.channel.outbox import Outbox
@@ -94,7 +95,7 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
     assert [type(one) for one in told].index(LensResult) < len(told) - 1
     np.testing.assert_array_equal(workspace.camera.parameters, FOUND.parameters)
     np.testing.assert_allclose(workspace.camera_file.camera().parameters, FOUND.parameters)
-    workspace.undo()
+    workspace.dispatch(Undo())
     assert workspace.camera is GIVEN
 
 
