@@ -81,7 +81,7 @@ paper: dev  ## Repeat the paper's experiments on simulated sessions; write docs/
 	$(BIN)/python -m benchmarks.paper $(PAPER)
 
 sample: env  ## Regenerate sample_data/.
-	$(BIN)/python -m calib_core.synthetic.sample sample_data
+	$(BIN)/python -m benchmarks.sample sample_data
 
 image: dev  ## Retake the README's images.
 	@$(BIN)/python tests/find_browser.py --install

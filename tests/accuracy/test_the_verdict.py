@@ -5,11 +5,11 @@ import pytest
 from scipy.special import bdtrc
 
 from benchmarks.accuracy.verdicts import Verdicts, measure_verdict, share_inside
+from benchmarks.sample import SAMPLE_OPTIONS
 from calib_core.calibration import calibrate
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.recording import simulate
-from calib_core.synthetic.sample import SAMPLE_OPTIONS
 from cocalib.session.state import Session
 from cocalib.view.build import verdict_row
 

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.sample import SAMPLE_NAME, SAMPLE_OPTIONS, write_sample
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers.writing import write_ros1_bag
 from calib_core.synthetic.files import clicks_text, radar_messages, truth_text
 from calib_core.synthetic.recording import SimulatedRecording, simulate
-from calib_core.synthetic.sample import SAMPLE_NAME, SAMPLE_OPTIONS, write_sample
 
 LARGEST_BYTES = 12_000_000
 FIRST_IMAGES = 24
@@ -66,7 +66,7 @@ def test_the_command_replaces_the_sample_and_its_text(sample, tmp_path, monkeypa
         assert recording.options == SAMPLE_OPTIONS
         folder.mkdir(parents=True)
 
-    monkeypatch.setattr("calib_core.synthetic.sample.write_recording", write)
+    monkeypatch.setattr("benchmarks.sample.write_recording", write)
     (tmp_path / SAMPLE_NAME).mkdir()
     (tmp_path / SAMPLE_NAME / "old").touch()
 

@@ -4,7 +4,6 @@ import pytest
 
 from calib_core.errors import InputError
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
-from cocalib.batch.schemas import write_batch_schemas
 
 OUTCOME = Outcome(
     OUTCOME_SCHEMA,
@@ -39,10 +38,3 @@ def test_what_is_written_is_read():
 def test_anything_else_is_refused(text):
     with pytest.raises(InputError):
         read_outcome(text)
-
-
-def test_the_published_schemas_are_those_of_the_types(tmp_path, project_root):
-    write_batch_schemas(tmp_path)
-    written = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
-    published = {name: (project_root / "docs" / "schemas" / name).read_text(encoding="utf-8") for name in written}
-    assert published == written, "run: python -m cocalib.batch.schemas docs/schemas"

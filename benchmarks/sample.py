@@ -1,4 +1,4 @@
-"""Regenerate the sample recording: python -m calib_core.synthetic.sample sample_data."""
+"""Regenerate the sample recording: python -m benchmarks.sample sample_data."""
 
 import argparse
 import shutil
@@ -40,7 +40,7 @@ down at 20 places on a rooftop. No real sensor was involved.
 | `truth.json` | the true `camera_from_radar`, and where and when the reflector stood still; for tests and benchmarks only |
 
 The reflector's position is its apex, the inner corner where the three sheets meet. The apex is the phase centre and the
-point to click. `make sample` (`python -m calib_core.synthetic.sample sample_data`) regenerates these files; how a processor
+point to click. `make sample` (`python -m benchmarks.sample sample_data`) regenerates these files; how a processor
 rounds decides the last bits of a few images.
 """
 
@@ -61,7 +61,7 @@ def write_sample(folder: Path) -> tuple[Path, ...]:
 
 def main(arguments: list[str]) -> int:
     """Write the sample to the folder given on the command line."""
-    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Regenerate the sample recording.")
+    parser = argparse.ArgumentParser(prog="benchmarks.sample", description="Regenerate the sample recording.")
     parser.add_argument("folder", type=Path, help="parent folder, such as sample_data")
     for path in write_sample(parser.parse_args(arguments).folder):
         print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")

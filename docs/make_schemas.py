@@ -1,6 +1,5 @@
-"""JSON Schema of our files, generated from the types: `python -m calib_core.interchange.own.schemas docs/schemas`."""
+"""Write docs/schemas, the JSON Schema of each of our files, from the types: `python docs/make_schemas.py`."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,10 @@ from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, Prop
 from calib_core.interchange.syntax.strict_json import is_setting, json_text
 from calib_core.json_forms import form_of
 from calib_core.measurements import Stamp
+from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome
+from cocalib.batch.results_table import RESULTS_SCHEMA, BatchResults
+
+FOLDER = Path(__file__).parent / "schemas"
 
 _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,
@@ -35,6 +38,8 @@ _DOCUMENTS: dict[str, Any] = {
     BOARD_VIEWS_SCHEMA: BoardViewsDocument,
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
+    OUTCOME_SCHEMA: Outcome,
+    RESULTS_SCHEMA: BatchResults,
 }
 
 _NAMES = {
@@ -60,12 +65,10 @@ _NAMES = {
 
 def schema_texts() -> dict[str, str]:
     """Return the JSON Schema (2020-12) of each of our files, keyed by the file name of the schema."""
-    return {schema_file_name(name): schema_text(name, document) for name, document in _DOCUMENTS.items()}
-
-
-def schema_file_name(name: str) -> str:
-    """Return the file name of a schema, such as outcome-1.schema.json of cocalib/outcome-1."""
-    return f"{name.removeprefix('cocalib/')}.schema.json"
+    return {
+        f"{name.removeprefix('cocalib/')}.schema.json": schema_text(name, document)
+        for name, document in _DOCUMENTS.items()
+    }
 
 
 def schema_text(name: str, document: Any) -> str:
@@ -81,13 +84,6 @@ def schema_text(name: str, document: Any) -> str:
     published = _published(top, components | stamp, definitions)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
     return json_text({**head, **published, "$defs": definitions})
-
-
-def write_schemas(folder: Path) -> None:
-    """Write every schema into a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in schema_texts().items():
-        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _form_schema(kind: Any) -> dict[str, Any]:
@@ -123,4 +119,5 @@ def _published(schema: Any, components: dict[str, Any], definitions: dict[str, A
 
 
 if __name__ == "__main__":
-    write_schemas(Path(sys.argv[1]))
+    for file_name, text in schema_texts().items():
+        (FOLDER / file_name).write_text(text, encoding="utf-8")
