@@ -14,7 +14,7 @@ _SHELL_PIPES = ("/dev/fd/", "/proc/self/fd/", "/dev/stdin")
 """Where a shell puts what `<(command)` writes: there is a writer, so reading it ends."""
 _PIPE = "a named pipe (FIFO)"
 _WRITER_TIMEOUT_S = 5.0
-_MAX_TEXT_BYTES = 64 << 20
+MAX_TEXT_BYTES = 64 << 20
 _BEGINNINGS = {
     **dict.fromkeys(
         (b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"), "a recording; give it as RECORDING, or with --recording"
@@ -106,18 +106,31 @@ def read_input(path: Path, *, max_bytes: int, is_what: str, if_missing: str = ""
 
 
 def read_text(
-    path: Path, *, is_what: str = "a file of clicks or pairs", max_bytes: int = _MAX_TEXT_BYTES, if_missing: str = ""
+    path: Path, *, is_what: str = "a file of clicks or pairs", max_bytes: int = MAX_TEXT_BYTES, if_missing: str = ""
 ) -> str:
     """Read a small text file; the arguments and errors are those of `read_input`.
 
     Raises:
         InputError: it cannot be read, or is not text.
     """
-    data = read_input(path, max_bytes=max_bytes, is_what=is_what, if_missing=if_missing)
+    return text_of(read_input(path, max_bytes=max_bytes, is_what=is_what, if_missing=if_missing), str(path), is_what)
+
+
+def text_of(data: bytes, source: str, is_what: str) -> str:
+    """Return the text of a file's content.
+
+    Raises:
+        InputError: it is not text.
+    """
     try:
         return file_text(data)
     except UnicodeDecodeError:
-        raise InputError(f"{path}: {no_text(data, is_what)}") from None
+        raise InputError(f"{source}: {no_text(data, is_what)}") from None
+
+
+def is_known_binary(data: bytes) -> bool:
+    """Return whether a file's first bytes are those of a kind that is no text."""
+    return data.startswith(tuple(_BEGINNINGS))
 
 
 def no_text(data: bytes, wanted: str) -> str:

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import read_text
+from calib_core.input_files import MAX_TEXT_BYTES, read_input, read_text
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, VehicleNote
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
@@ -16,6 +16,7 @@ from calib_core.interchange.exporting import export as export_file
 from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_files
+from calib_core.interchange.pair_tables import read_pair_table
 from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
 from calib_core.results import Calibration
@@ -39,7 +40,7 @@ def read_camera(path: PathLike, *, image_size_px: tuple[int, int] | None = None)
 def read_pairs(
     path: PathLike, camera: Camera | None = None, *, noise: NoiseOptions | None = None
 ) -> pairs_files.PairsFile:
-    """Read a pairs-1 file (pairs, camera and, if stated, noise and camera position), or a table of pairs (CSV).
+    """Read a pairs-1 file (pairs, camera and, if stated, noise and camera position), or a table of pairs (CSV, npy, npz).
 
     Args:
         path: of the file.
@@ -50,7 +51,8 @@ def read_pairs(
         InputError: invalid content; the message names the file, the place and what to do.
     """
     if camera is not None:
-        return pairs_files.read_pairs_table(_text(path), camera, str(path), noise=noise)
+        data = read_input(Path(path), max_bytes=MAX_TEXT_BYTES, is_what="a table of pairs")
+        return read_pair_table(data, source=str(path)).pairs(camera, noise, source=str(path))
     return pairs_files.read_pairs(_text(path), str(path), noise=noise)
 
 

@@ -345,6 +345,20 @@ _SPELT_IN_MESSAGES = spelt((*SPELLINGS, *AMBIGUOUS))
 _SPELT_IN_TABLES = spelt((*SPELLINGS, *TABLE_ANGLES))
 
 
+_PIXELS = spelt(
+    _spellings("""
+u 0: u; u px; px u; x px; px x; pixel u; pixel x; image u; image x; img u; img x; col; column; pixel column
+v 0: v; v px; px v; y px; px y; pixel v; pixel y; image v; image y; img v; img y; row; pixel row
+""")
+)
+
+
+def pixel_axis(name: str) -> str:
+    """Return "u" or "v" if a column of pairs holds this coordinate of a pixel, else ""."""
+    spelling = _PIXELS.get(frozenset(words_of(name)) - SUBJECTS)
+    return spelling.kind if spelling else ""
+
+
 @cache
 def meaning_of(name: str) -> Meaning | None:
     """Return what the dotted name of a message's field means; None if it is none of the quantities in use."""

@@ -441,8 +441,9 @@ def open_recording(
     streams, rest, taken = open_uart_streams(chosen, options.radar_start)
     sources: tuple[Source, ...] = streams
     try:
-        plain_options = replace(_plain_options(options), taken=taken)
-        plain, others = open_plain_sources(rest, plain_options, streams) if rest else (streams, ())
+        plain, others = streams, rest
+        if rest:
+            plain, others = open_plain_sources(rest, replace(plain_options(options), taken=taken), streams)
         sources = plain
         sources = (*(open_sources(others) if others else ()), *plain)
         if file is not None:
@@ -461,7 +462,12 @@ def open_recording(
         raise
 
 
-def _plain_options(options: RecordingOptions) -> PlainOptions:
+def plain_options(options: RecordingOptions) -> PlainOptions:
+    """Return what applies to files outside ROS containers.
+
+    Raises:
+        OptionError: --map, --radar-axes or --time-zone is malformed.
+    """
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
     unit = "" if axes is None or axes.degrees is None else "deg" if axes.degrees else "rad"
     only_unit = options.radar_axes is not None and options.radar_axes.strip().lower() in ("degrees", "radians")

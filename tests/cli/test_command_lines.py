@@ -35,7 +35,7 @@ _TABLE = [
     ),
     (2, "solve --pairs good-pairs.json --method pmm", "--method takes default or paper, not 'pmm'"),
     (2, "solve --pairs good-pairs.json --camera good-pairs.json", "brings its own camera"),
-    (2, "solve --pairs good-pairs.json --radar-axes up,up,up", "do not apply to --pairs"),
+    (2, "solve --pairs good-pairs.json --radar-axes up,up,up", "leave out --map"),
     (2, "solve --pairs good.json --set gating.max_range_m=8", "gating.max_range_m chooses radar returns"),
     (2, "solve --pairs good-pairs.json --out .", "is a folder"),
     (2, "solve --pairs good-pairs.json --out nowhere/a.json", "does not exist; create it"),

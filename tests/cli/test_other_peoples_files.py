@@ -53,3 +53,22 @@ def test_messages_as_rostopic_echo_writes_them_are_a_table_of_returns(cocalib, c
     radar = json.loads(answer.out)["radar"]
     assert radar["scans"] == 7
     assert [row["column"] for row in radar["columns"]][:3] == ["x", "y", "z"]
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "flat"),
+    [
+        ("50-npy-pairs", "pairs.npz", False),
+        ("52-pairs-without-z", "pairs.csv", True),
+        ("56-mm-decimal-comma", "pairs.csv", False),
+        ("60-pairs-of-a-click-tool", "point_pairs.txt", True),
+    ],
+)
+def test_pairs_in_the_spellings_of_other_tools_give_the_pose(cocalib, cases, sample, tmp_path, case, name, flat):
+    out = tmp_path / "c.json"
+    answer = cocalib("solve", "--pairs", cases / case / name, "--camera", cases / case / "camera.yaml", "--out", out)
+    assert answer.code == 0, answer.err
+    assert flat or error_of(out, sample) < (0.15, 1.5)
+    calibration = read_calibration(out.read_text()).calibration
+    assert sum(pair.inlier for pair in calibration.pairs) == 20
+    assert ("assumed" in {one.code for one in calibration.warnings}) == (case.startswith("60"))

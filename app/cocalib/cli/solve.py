@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import read_text
+from calib_core.input_files import MAX_TEXT_BYTES, read_input
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -69,8 +69,8 @@ class Solve:
     json: MoreSwitch = False
     """With --propose: print everything as JSON (cocalib/proposals-1)."""
     pairs: File = None
-    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV of x, y, z, u, v), or a
-    calibration to solve again."""
+    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV, npy or npz of x, y, z,
+    u, v), or a calibration to solve again."""
     camera: GivenCamera = field(default_factory=CameraFlags)
     out: OutFile = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
@@ -104,8 +104,8 @@ class Solve:
         if self.pairs is not None:
             if self.recorded.recording or self.clicks or self.auto:
                 raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
-            if self.recorded.topics != TopicFlags():
-                raise InputError("the options of a recording do not apply to --pairs")
+            if dataclasses.replace(self.recorded.topics, map=(), radar_axes=None) != TopicFlags():
+                raise InputError("of the options of a recording only --map and --radar-axes apply to --pairs")
             return
         if not self.recorded.recording:
             raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
@@ -237,7 +237,10 @@ class Solve:
     def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
         from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 
-        given = GivenPairs.read(read_text(path), str(path), self.camera.read())
+        data = read_input(path, max_bytes=MAX_TEXT_BYTES, is_what="a file of pairs")
+        given = GivenPairs.read(data, str(path), self.camera.read(), self.recorded.topics)
+        for assumption in given.assumed:
+            print(f"note: {path}: {assumption.text} (state it: {assumption.confirm})", file=sys.stderr)
         again = None if given.file is None else given.file.calibration.options
         outcome = solve_pairs(given, self._all_options(again))
         if isinstance(outcome, Unsolvable):

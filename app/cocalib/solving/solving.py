@@ -12,16 +12,19 @@ from calib_core.association.pairing import RadarSource, half_window_s, pair_clic
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
-from calib_core.input_files import name_text
+from calib_core.input_files import name_text, text_of
 from calib_core.interchange.calibration_file import AssumptionNote, CalibrationFile, FrameNames, Provenance, VehicleNote
 from calib_core.interchange.cameras.files import CameraFile
 from calib_core.interchange.own.calibration_json import calibration_text as interchange_text
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
-from calib_core.interchange.own.pairs_files import read_pairs, read_pairs_table
+from calib_core.interchange.own.pairs_files import read_pairs
+from calib_core.interchange.pair_tables import PairTable, read_pair_table
 from calib_core.measurements import Candidate, DataWarning, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
-from calib_core.recordings import Recording, about_assumptions
+from calib_core.recordings import Recording, RecordingOptions, about_assumptions
+from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import damaged_recording, lost_returns
 from calib_core.words.warnings import told
@@ -150,31 +153,57 @@ class GivenPairs:
     """A file of pairs, or a calibration that is to be solved again.
 
     Attributes:
-        text: its content.
+        data: its content.
         source: its path, for error messages.
         file: what it says, if it is a calibration.
-        camera_file: the intrinsics for a table of pairs (CSV); None for the others, which bring their own.
+        table: what it says, if it is a table of pairs or holds arrays.
+        camera_file: the intrinsics for a table; None for the others, which bring their own.
     """
 
-    text: str
+    data: bytes
     source: str
     file: CalibrationFile | None
+    table: PairTable | None = None
     camera_file: CameraFile | None = None
 
     @classmethod
-    def read(cls, text: str, source: str, camera_file: CameraFile | None = None) -> "GivenPairs":
-        """Read a calibration; a file of pairs is read when the options are known.
+    def read(
+        cls,
+        content: str | bytes,
+        source: str,
+        camera_file: CameraFile | None = None,
+        options: RecordingOptions | None = None,
+    ) -> "GivenPairs":
+        """Read a calibration or a table; a file of pairs is read when the options are known.
+
+        Args:
+            content: of the file.
+            source: its path.
+            camera_file: for a table.
+            options: how a table is read: its map and radar_axes.
 
         Raises:
-            InputError: the calibration is not valid, or a camera is given for a file that brings one, or none for a table.
+            InputError: it is not valid, or a camera is given for a file that brings one, or none for a table.
         """
-        is_table = not text.lstrip("\ufeff \t\r\n").startswith(("{", "["))
+        data = content.encode() if isinstance(content, str) else content
+        is_table = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] not in (b"{", b"[")
         if is_table and camera_file is None:
             raise InputError(f"{source}: not JSON; if it is a table of pairs (x, y, z, u, v), add --camera FILE")
-        if not is_table and camera_file is not None:
+        if is_table:
+            how = plain_options(options or RecordingOptions())
+            return cls(data, source, None, read_pair_table(data, source=source, options=how), camera_file)
+        if camera_file is not None:
             raise InputError(f"{source}: brings its own camera; leave out --camera")
+        if options and (options.map or options.radar_axes):
+            raise InputError(f"{source}: states its units and axes; leave out --map and --radar-axes")
+        text = text_of(data, source, is_what="a file of pairs")
         file = read_calibration(text, source) if names_schema(text, CALIBRATION_SCHEMA) else None
-        return cls(text, source, file, camera_file)
+        return cls(text.encode(), source, file)
+
+    @property
+    def assumed(self) -> tuple[Assumption, ...]:
+        """What a table does not state, in units and axes."""
+        return self.table.assumptions if self.table else ()
 
 
 def solve_pairs(given: GivenPairs, options: CalibrationOptions | None = None) -> Outcome:
@@ -198,10 +227,10 @@ def solve_pairs(given: GivenPairs, options: CalibrationOptions | None = None) ->
         except InputError as error:
             raise InputError(f"{given.source}: {error}") from None
     options = checked_options(options or CalibrationOptions())
-    if given.camera_file is None:
-        pairs_file = read_pairs(given.text, given.source, noise=options.noise)
+    if given.table is None or given.camera_file is None:
+        pairs_file = read_pairs(given.data.decode(), given.source, noise=options.noise)
     else:
-        pairs_file = read_pairs_table(given.text, given.camera_file.camera(), given.source, noise=options.noise)
+        pairs_file = given.table.pairs(given.camera_file.camera(), options.noise, source=given.source)
     return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
 
 
@@ -323,7 +352,7 @@ def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehic
     vehicle = vehicle or VehicleNote()
     camera_file = given.camera_file
     inputs = (
-        _input_file(given.source, given.text.encode()),
+        _input_file(given.source, given.data),
         *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),
     )
     if (file := given.file) is not None:
@@ -331,7 +360,11 @@ def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehic
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
-    return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)
+    warnings = (*calibration.warnings, *about_assumptions(given.assumed))
+    provenance = Provenance(
+        inputs=inputs, version=version(), assumptions=tuple(AssumptionNote(one.text, False) for one in given.assumed)
+    )
+    return interchange_text(dataclasses.replace(calibration, warnings=warnings), provenance=provenance, vehicle=vehicle)
 
 
 def required_camera(recording: Recording, camera_file: CameraFile | None) -> Camera:

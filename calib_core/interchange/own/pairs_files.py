@@ -1,15 +1,13 @@
-"""Ready-made pairs, for scripts that do their own pairing: pairs-1, written and read, and tables (CSV) of five numbers a row."""
+"""Ready-made pairs, for scripts that do their own pairing: pairs-1, written and read."""
 
-import csv
 import dataclasses
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Vector3
-from calib_core.association.array_pairs import pairs_from_arrays, too_near
+from calib_core.association.array_pairs import too_near
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import (
@@ -39,6 +37,7 @@ class PairsFile:
         sigma_azimuth_rad: the same for its azimuth [rad].
         sigma_elevation_rad: the same for its elevation [rad].
         camera_position: the tape-measured camera centre; None if the file has none.
+        assumed: what a table does not state about units and axes, and was assumed.
     """
 
     camera: Camera
@@ -47,6 +46,7 @@ class PairsFile:
     sigma_azimuth_rad: float | None = None
     sigma_elevation_rad: float | None = None
     camera_position: CameraPositionPrior | None = None
+    assumed: tuple[str, ...] = ()
 
     def options(self, given: CalibrationOptions) -> CalibrationOptions:
         """Return the options, overridden by what the file states."""
@@ -92,48 +92,6 @@ def read_pairs(text: str, source: str = "pairs", *, noise: NoiseOptions | None =
     )
 
 
-def read_pairs_table(
-    text: str, camera: Camera, source: str = "pairs", *, noise: NoiseOptions | None = None
-) -> PairsFile:
-    """Read pairs from a table with commas, semicolons, tabs or spaces between its columns.
-
-    Args:
-        text: a row for each pair: x, y, z in the radar frame [m], u, v [px], and maybe an id. A first row may name the columns,
-            which may then have any order, with or without units: `id,u_px,v_px,x_m,y_m,z_m`.
-        camera: the camera that the pixels are of.
-        source: the name of the table in error messages.
-        noise: of the radar; None uses the defaults.
-
-    Raises:
-        InputError: a row is not five numbers, or a column is missing; the message names the line and what to do.
-    """
-    rows = [(number, cells) for number, cells in enumerate(_cells(text), 1) if cells]
-    columns: Sequence[str] = (*_TABLE_COLUMNS, "id")
-    if rows and not _is_number(rows[0][1][0]):
-        columns = _named_columns(rows.pop(0)[1], f"{source}: its first line '{text.strip().splitlines()[0][:80]}'")
-    if not rows:
-        raise InputError(f"{source}: has no rows; {_TABLE_HINT}")
-    numbers, ids = [], []
-    for line, cells in rows:
-        row = dict(zip(columns, cells, strict=False))
-        if len(cells) > len(columns) or not all(_is_number(row.get(name, "")) for name in _TABLE_COLUMNS):
-            commas = (
-                "write decimal points, not commas; "
-                if any(_is_number(cell.replace(",", ".")) for cell in cells if "," in cell)
-                else ""
-            )
-            raise InputError(
-                f"{source}: line {line}: '{text.splitlines()[line - 1]}' is not a pair; {commas}{_TABLE_HINT}"
-            )
-        numbers.append([float(row[name]) for name in _TABLE_COLUMNS])
-        ids.append(row.get("id") or f"pair-{len(numbers)}")
-    values = np.array(numbers)
-    try:
-        return PairsFile(camera, pairs_from_arrays(values[:, :3], values[:, 3:], noise=noise, ids=ids))
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
-
-
 def write_pairs(pairs_file: PairsFile) -> str:
     """Write pairs-1 text; the same pairs give the same bytes."""
     sigmas = (pairs_file.sigma_range_m, pairs_file.sigma_azimuth_rad, pairs_file.sigma_elevation_rad)
@@ -146,33 +104,6 @@ def write_pairs(pairs_file: PairsFile) -> str:
         camera_position_in_radar=PositionDocument(prior.position_m, prior.sigma_m) if prior else None,
     )
     return document_text(document)
-
-
-_TABLE_COLUMNS = ("x", "y", "z", "u", "v")
-_TABLE_HINT = "a table of pairs has the columns x, y, z of the radar [m] and u, v of the image [px], and maybe id"
-
-
-def _cells(text: str) -> list[list[str]]:
-    """Split a table into cells: by the first of semicolon, tab, comma that its first line has, else by spaces."""
-    lines = text.removeprefix("\ufeff").splitlines()
-    delimiter = next((one for one in ";\t," if lines and one in lines[0]), None)
-    split = [line.split() for line in lines] if delimiter is None else csv.reader(lines, delimiter=delimiter)
-    return [[cell.strip() for cell in cells] for cells in split]
-
-
-def _named_columns(names: Sequence[str], line: str) -> Sequence[str]:
-    columns = [name.lower().removesuffix("_px").removesuffix("_m") for name in names]
-    missing = [name for name in _TABLE_COLUMNS if columns.count(name) != 1]
-    if missing:
-        raise InputError(f"{line} does not name {' and '.join(missing)} once; {_TABLE_HINT}")
-    return columns
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
 
 
 def _sigma_polar(radar: RadarDocument, noise: NoiseOptions) -> Vector3:

@@ -1,9 +1,11 @@
 """clicks-1, pairs-1 and calibration-1: their content reads back, and invalid content is refused with a clear error."""
 
 import dataclasses
+import io
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +24,8 @@ from calib_core.interchange.own.board_views_json import (
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, read_clicks_file, write_clicks
 from calib_core.interchange.own.lens_documents import ImageSource
-from calib_core.interchange.own.pairs_files import read_pairs, read_pairs_table, write_pairs
+from calib_core.interchange.own.pairs_files import read_pairs, write_pairs
+from calib_core.interchange.pair_tables import read_pair_table
 from calib_core.intrinsics.board import board_of_size
 from calib_core.intrinsics.board_images import BoardCorners
 from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
@@ -437,31 +440,74 @@ def test_a_table_of_pairs_is_read_whatever_stands_between_its_columns(delimiter,
     rows = [head.replace(" ", delimiter)] if head else []
     text = "\n".join([*rows, *(delimiter.join(map(str, row)) for row in TABLE), ""])
 
-    pairs = read_pairs_table(text, PINHOLE, "p.csv").pairs
+    table = read_pair_table(text.encode(), source="p.csv")
 
-    assert [(*pair.candidates[0].position_radar_m, *pair.pixel_px) for pair in pairs] == list(TABLE)
-    assert [pair.id for pair in pairs] == ["pair-1", "pair-2"]
+    assert np.column_stack([table.points_radar_m, table.pixels_px]).tolist() == [list(row) for row in TABLE]
+    assert table.ids == ("pair-1", "pair-2")
+    assert [one.key for one in table.assumptions] == (["length-unit"] if head.startswith("X") else [])
 
 
 def test_the_columns_of_a_table_may_have_any_order_and_ids():
-    (pair,) = read_pairs_table("v_px,u_px,id,z_m,y_m,x_m,note\n239.4,212.9,p7,-0.5,1,5,far\n", PINHOLE).pairs
+    text = b"v_px,u_px,id,z_m,y_m,x_m,note\n239.4,212.9,p7,-0.5,1,5,far\n"
+    (pair,) = read_pair_table(text, source="p.csv").pairs(PINHOLE, None, source="p.csv").pairs
 
     assert (pair.id, *pair.candidates[0].position_radar_m, *pair.pixel_px) == ("p7", *TABLE[0])
+
+
+SPELLINGS = {
+    "mm, commas": b"id;X [mm];Y [mm];Z [mm];u;v\np;5000,0;1000,0;-500,0;212,9;239,4\nq;7100;200;-400;340;251,5\n",
+    "units below": b"x y z u v\n[m] [m] [m] [px] [px]\n5.0 1.0 -0.5 212.9 239.4\n7.1 0.2 -0.4 340.0 251.5\n",
+    "in a comment": b"# pixel_u, pixel_v, radar_x_m, radar_y_m, z_m\n212.9,239.4,5,1,-0.5\n340,251.5,7.1,0.2,-0.4\n",
+    "pixels named x and y": b"x_m,y_m,z_m,img_x,img_y\n5,1,-0.5,212.9,239.4\n7.1,0.2,-0.4,340,251.5\n",
+}
+
+
+@pytest.mark.parametrize("kind", SPELLINGS)
+def test_a_table_of_pairs_has_the_spellings_of_a_radar_table(kind):
+    table = read_pair_table(SPELLINGS[kind], source="p.csv")
+    assert np.allclose(np.column_stack([table.points_radar_m, table.pixels_px]), TABLE)
+
+
+def saved(save: Callable[..., None], *arrays: np.ndarray, **named: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    save(file, *arrays, **named)
+    return file.getvalue()
+
+
+def test_pairs_are_read_from_arrays_and_a_radar_without_elevation_has_height_0():
+    whole = np.array(TABLE)
+    flat = whole[:, [0, 1, 3, 4]]
+    for data in (
+        saved(np.save, whole),
+        saved(np.savez, pcl=whole[:, :3], img=whole[:, 3:]),
+        saved(np.savez, pairs=whole),
+    ):
+        table = read_pair_table(data, source="p.npz")
+        assert np.column_stack([table.points_radar_m, table.pixels_px]).tolist() == whole.tolist()
+    text = "x_m,y_m,u_px,v_px\n" + "\n".join(",".join(map(str, row)) for row in flat.tolist())
+    for data in (saved(np.save, flat), saved(np.savez, img=flat[:, 2:], radar=flat[:, :2]), text.encode()):
+        table = read_pair_table(data, source="p.npz")
+        assert table.points_radar_m.tolist() == np.column_stack([flat[:, :2], [0.0, 0.0]]).tolist()
+        assert table.pixels_px.tolist() == flat[:, 2:].tolist()
+    with pytest.raises(InputError, match="savez"):
+        read_pair_table(saved(np.save, whole[:, :3]), source="p.npy")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "has no rows"),
-        ("x_m,y_m,z_m,u_px,v_px\n", "has no rows"),
-        ("a,b\n1,2\n", "does not name x and y and z and u and v once"),
-        ("5,1,-0.5,212.9,239.4\n5,1,-0.5,212.9\n", "line 2: '5,1,-0.5,212.9' is not a pair"),
-        ("5,1,-0.5,212.9,239.4\n5,1,nan,212.9,239.4\n", "line 2"),
-        ("5,1,-0.5,212.9,239.4,p1,6\n", "line 1"),
+        ("", "empty"),
+        ("x_m,y_m,z_m,u_px,v_px\n", "no rows"),
+        ("a,b\n1,2\n", "the columns are a, b"),
+        ("x_m,z_m,u,v\n1,2,3,4\n", "no position columns"),
+        ("5,1,-0.5,212.9,239.4\n5,1,-0.5,212.9\n", "line 2: too few columns"),
+        ("5,1,-0.5,212.9,239.4\n5,1,-0.5,2", "last row"),
+        ("5,1,-0.5,212.9,239.4\n5,1,nan,212.9,239.4\n", "[1]"),
+        ("5,1,-0.5,212.9,239.4,p1,6\n", "7 columns"),
         ("0,0,0,212.9,239.4\n", "at the radar's origin"),
     ],
 )
 def test_a_table_that_is_not_one_of_pairs_is_refused(text, words):
     with pytest.raises(InputError, match=re.escape(words)) as refusal:
-        read_pairs_table(text, PINHOLE, "p.csv")
+        read_pair_table(text.encode(), source="p.csv").pairs(PINHOLE, None, source="p.csv")
     assert str(refusal.value).startswith("p.csv: ")

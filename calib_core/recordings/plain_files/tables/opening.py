@@ -40,7 +40,7 @@ from calib_core.recordings.radar.column_guess import (
     unknown_unit,
 )
 from calib_core.recordings.radar.column_plan import ColumnPlan, RadarAxes, StatedReading
-from calib_core.recordings.radar.columns import returns_from
+from calib_core.recordings.radar.columns import Returns, returns_from
 from calib_core.recordings.radar.message_layouts.single_returns import POINT_NUMBERS, SHORTEST_CYCLE_NS, first_of_scans
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
@@ -55,8 +55,8 @@ _POSITION = ("x", "y", "z", *_POLAR)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Columns:
-    """The columns of a table.
+class RadarColumns:
+    """The columns of a table with a radar's positions.
 
     Attributes:
         names: of all columns, as written.
@@ -74,7 +74,7 @@ class _Columns:
     wanted: tuple[int, ...]
     plan: ColumnPlan
 
-    def with_values(self, path: Path, values: np.ndarray) -> "_Columns":
+    def with_values(self, path: Path, values: np.ndarray) -> "RadarColumns":
         """Return the same with the plan that the values show."""
         return replace(self, plan=_plan(path, self.names, self.units, self.wanted, self.stated, values))
 
@@ -82,6 +82,11 @@ class _Columns:
     def shown(self) -> ColumnPlan:
         """The plan with what is claimed, to find contradictions where positions are not made of it."""
         return replace(self.plan, claiming=not self.plan.polar)
+
+    def returns(self, values: np.ndarray) -> Returns:
+        """Return what rows hold, given the values of the wanted columns (n, k), in SI units and the radar's axes."""
+        places = {self.names[place]: number for number, place in reversed(list(enumerate(self.wanted)))}
+        return returns_from(self.shown, lambda name: values[:, places[name]])
 
 
 def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
@@ -91,7 +96,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         RecordingError: a position or the time is missing, a unit is unknown, or a row is damaged.
     """
     table, topic = _open(path, options), topic_of(path, "radar")
-    columns = _columns(table, options)
+    columns = radar_columns(table, options)
     times = _times(table, columns, topic, options)
     if times is None:
         shown = ", ".join(name.strip() for name in table.names[:12])
@@ -125,7 +130,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
     )
 
 
-def _first_of_scans(columns: _Columns, times_ns: TimesNs, values: np.ndarray) -> np.ndarray:
+def _first_of_scans(columns: RadarColumns, times_ns: TimesNs, values: np.ndarray) -> np.ndarray:
     """Return the row that begins each scan: a row with another time, or of rows with times of their own, as of messages."""
     pauses_ns = np.diff(times_ns)
     if np.count_nonzero((pauses_ns > 0) & (pauses_ns < SHORTEST_CYCLE_NS)) <= np.count_nonzero(pauses_ns == 0):
@@ -143,7 +148,7 @@ def _numbers_returns(name: str) -> bool:
 def table_fault(path: Path, options: PlainOptions) -> str:
     """Say why a file is not a table of radar returns, judging by its beginning; "" if it is one."""
     try:
-        _columns(_open(path, options), options)
+        radar_columns(_open(path, options), options)
     except RecordingError as error:
         return str(error).removeprefix(f"{path}: ")
     return ""
@@ -153,7 +158,7 @@ def is_one_scan_each(files: Sequence[Path], options: PlainOptions) -> bool:
     """Return whether tables with numbered or dated names hold one scan each: no times inside, or one time each."""
     try:
         table = _open(files[0], options)
-        columns = _columns(table, options)
+        columns = radar_columns(table, options)
         times = _times(table, columns, "", options)
         if times is None or times.counted:
             return True
@@ -183,7 +188,7 @@ def open_table_folder(
     tables = [table for file in sample if (table := _open(file, options)).first_row]
     if not tables:
         raise RecordingError(f"{folder}: {len(files)} tables without a row in the {len(sample)} that were looked at")
-    columns = _columns(tables[0], options)
+    columns = radar_columns(tables[0], options)
     values = [_values(table, columns, options) for table in tables]
     columns = columns.with_values(folder, np.concatenate(values))
     times = _times(tables[0], columns, topic, options)
@@ -215,7 +220,7 @@ def _open(path: Path, options: PlainOptions) -> Table:
     return table
 
 
-def _columns(table: Table, options: PlainOptions) -> _Columns:
+def radar_columns(table: Table, options: PlainOptions) -> RadarColumns:
     """Choose the columns by their names.
 
     Raises:
@@ -243,7 +248,7 @@ def _columns(table: Table, options: PlainOptions) -> _Columns:
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from error
     plan = _plan(path, names, units, wanted, stated, np.zeros((0, len(wanted))))
-    return _Columns(names, units, stated, times, wanted, plan)
+    return RadarColumns(names, units, stated, times, wanted, plan)
 
 
 def _spelt(path: Path, names: Sequence[str], one: MappedColumn) -> str:
@@ -307,17 +312,17 @@ def _listed(names: Sequence[str]) -> str:
     return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"
 
 
-def _assumptions(columns: _Columns, topic: str) -> tuple[Assumption, ...]:
+def _assumptions(columns: RadarColumns, topic: str) -> tuple[Assumption, ...]:
     return tuple(replace(assumption.assumption, topic=topic) for assumption in columns.plan.assumptions)
 
 
-def _values(table: Table, columns: _Columns, options: PlainOptions) -> np.ndarray:
+def _values(table: Table, columns: RadarColumns, options: PlainOptions) -> np.ndarray:
     """Return the values of one file of a folder, in the order of columns.wanted.
 
     Raises:
         MessageError: its columns are not those of the first.
     """
-    own = _columns(table, options)
+    own = radar_columns(table, options)
     places = {name: place for place, name in reversed(list(enumerate(own.names)))}
     wanted = [columns.names[place] for place in columns.wanted]
     same = all(
@@ -338,17 +343,17 @@ def _rows(table: Table) -> Sequence[Sequence[str]]:
     return table.sample if isinstance(table, JsonTable) else first_rows(table)
 
 
-def _times(table: Table, columns: _Columns, topic: str, options: PlainOptions) -> TimeReader | None:
+def _times(table: Table, columns: RadarColumns, topic: str, options: PlainOptions) -> TimeReader | None:
     comma = isinstance(table, TextTable) and table.decimal_comma
     return time_reader(columns.times, _rows(table), topic, zone_s=options.zone_s, decimal_comma=comma)
 
 
-def _read(table: Table, columns: _Columns, times: TimeReader | None) -> TableRows:
+def _read(table: Table, columns: RadarColumns, times: TimeReader | None) -> TableRows:
     read = columns.wanted
     return read_json_rows(table, read, times) if isinstance(table, JsonTable) else read_rows(table, read, times)
 
 
-def _points_of_file(file: Path, columns: _Columns, options: PlainOptions) -> np.ndarray:
+def _points_of_file(file: Path, columns: RadarColumns, options: PlainOptions) -> np.ndarray:
     table = _open(file, options)
     values = _values(table, columns, options) if table.first_row else np.zeros((0, len(columns.wanted)))
     return _points(columns, values)
@@ -385,11 +390,9 @@ def _cut_off(path: Path) -> DataWarning:
     )
 
 
-def _points(columns: _Columns, values: np.ndarray) -> np.ndarray:
+def _points(columns: RadarColumns, values: np.ndarray) -> np.ndarray:
     """Return returns in SI units and the radar's axes as a structured array, one field per quantity."""
-    places = {columns.names[place]: number for number, place in reversed(list(enumerate(columns.wanted)))}
-    plan = columns.shown
-    returns = returns_from(plan, lambda name: values[:, places[name]])
+    plan, returns = columns.shown, columns.returns(values)
     height = plan.polar or len(plan.position) == 3
     fields = dict(zip("xyz" if height else "xy", returns.points_radar_m.T, strict=False))
     if returns.claimed_polar is not None:
@@ -416,7 +419,7 @@ def _is_documented(written: str) -> bool:
     return meaning is not None and is_plain(split_unit(written)[0], meaning)
 
 
-def _table_words(columns: _Columns, remarks: tuple[str, ...]) -> str:
+def _table_words(columns: RadarColumns, remarks: tuple[str, ...]) -> str:
     """Describe what was read and what was not, for the list of files."""
     plan = columns.plan
     renamed = [

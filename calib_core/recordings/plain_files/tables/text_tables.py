@@ -6,12 +6,13 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from io import BytesIO, TextIOWrapper
 from itertools import islice
 from operator import itemgetter
 from os import SEEK_END
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 import numpy as np
 
@@ -49,6 +50,7 @@ class TextTable:
         first_row: cells of the first row; () if there is none.
         first_line: the first line of the file, for messages.
         headless: whether there is no header.
+        content: of the file if it was read before, as of a pipe; None to read it as it is needed.
     """
 
     path: Path
@@ -61,6 +63,7 @@ class TextTable:
     first_row: tuple[str, ...] = ()
     first_line: str = ""
     headless: bool = False
+    content: bytes | None = None
 
     @contextmanager
     def rows(self) -> Iterator[Iterator[list[str]]]:
@@ -70,7 +73,7 @@ class TextTable:
             RecordingError: the file cannot be read as text.
         """
         try:
-            with self.path.open(newline="", encoding=self.encoding) as file:
+            with TextIOWrapper(_opened(self.path, self.content), self.encoding, newline="") as file:
                 for _ in range(self.skipped_lines):
                     file.readline(_HEAD_BYTES)
                 yield _reader(file, self.separator)
@@ -97,14 +100,22 @@ def _reader(file: TextIO, separator: str) -> Iterator[list[str]]:
     return csv.reader(file, delimiter=separator, skipinitialspace=separator == " ")
 
 
-def open_text_table(path: Path) -> TextTable:
+def _opened(path: Path, content: bytes | None) -> BinaryIO:
+    return path.open("rb") if content is None else BytesIO(content)
+
+
+def open_text_table(path: Path, content: bytes | None = None) -> TextTable:
     """Find out how a text file is laid out.
+
+    Args:
+        path: of the file.
+        content: of the file if it was read before.
 
     Raises:
         RecordingError: it is empty, or cannot be read.
     """
     try:
-        with path.open("rb") as file:
+        with _opened(path, content) as file:
             head = file.read(_HEAD_BYTES)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
@@ -119,7 +130,7 @@ def open_text_table(path: Path) -> TextTable:
         raise RecordingError(f"{path}: the first line has more than {_HEAD_BYTES} bytes; it is not a table of text")
     place, separator = _header_place(lines)
     if place is None:
-        return _headless(path, encoding, lines)
+        return replace(_headless(path, encoding, lines), content=content)
     names = _cells(_COMMENT.sub("", lines[place], count=1) if _COMMENT.match(lines[place]) else lines[place], separator)
     below = [(at, _cells(lines[at], separator)) for at in range(place + 1, len(lines)) if _is_row(lines[at])]
     units: tuple[str, ...] = ()
@@ -130,7 +141,7 @@ def open_text_table(path: Path) -> TextTable:
     first = below[0][1] if below else ()
     return TextTable(
         path, encoding, separator, names, units, skipped, separator in ";\t| " and _uses_commas(below), first,
-        lines[place] if lines else "",
+        lines[place] if lines else "", content=content,
     )  # fmt: skip
 
 
@@ -242,6 +253,12 @@ def first_rows(table: TextTable) -> list[list[str]]:
         return [row for row in islice(rows, _SAMPLED_ROWS) if _is_data(row)]
 
 
+def read_cells(table: TextTable, place: int) -> list[str]:
+    """Return the cells of one column, "" where a row is too short."""
+    with table.rows() as rows:
+        return [row[place].strip() if place < len(row) else "" for row in rows if _is_data(row)]
+
+
 def _is_data(row: Sequence[str]) -> bool:
     return bool(row) and any(map(str.strip, row)) and not row[0].lstrip().startswith(_COMMENTS)
 
@@ -295,7 +312,7 @@ def _is_end(table: TextTable, rows: Iterator[list[str]]) -> bool:
     """Return whether no row follows and the file does not end with a line feed: its writer was stopped within a row."""
     if next(rows, None) is not None:
         return False
-    with table.path.open("rb") as file:
+    with _opened(table.path, table.content) as file:
         file.seek(-2, SEEK_END)
         return b"\n" not in file.read()
 
