@@ -12,7 +12,7 @@ from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import is_known_binary, no_text
-from calib_core.interchange.hypotheses.plain_values import plain_values
+from calib_core.interchange.hypotheses.plain_values import is_npy, plain_values
 from calib_core.interchange.own.pairs_files import PairsFile
 from calib_core.interchange.syntax.content import readings
 from calib_core.options import NoiseOptions
@@ -23,7 +23,6 @@ from calib_core.recordings.plain_files.tables.opening import radar_columns
 from calib_core.recordings.plain_files.tables.text_tables import TextTable, open_text_table, read_cells, read_rows
 from calib_core.recordings.radar.column_guess import split_unit
 
-_ARRAYS = (b"\x93NUMPY", b"PK\x03\x04")
 _EXAMPLE = "id,x_m,y_m,z_m,u_px,v_px"
 _UNNAMED: Mapping[int, tuple[str, ...]] = {
     4: ("x_m", "y_m", "u", "v"), 5: ("x_m", "y_m", "z_m", "u", "v"), 6: ("x_m", "y_m", "z_m", "u", "v", "id"),
@@ -75,9 +74,8 @@ def read_pair_table(data: bytes, *, source: str, options: PlainOptions | None = 
     Raises:
         InputError: a column or a number is missing; the message names the line and what to do.
     """
-    values = plain_values(next(readings(data, source=source)), source=source) if data.startswith(_ARRAYS) else None
-    if isinstance(values, np.ndarray) or values:
-        return _of_arrays(values, source)
+    if is_npy(data) or (data.startswith(b"PK") and b".npy" in data):
+        return _of_arrays(plain_values(next(readings(data, source=source)), source=source), source)
     if is_known_binary(data):
         raise InputError(f"{source}: {no_text(data, 'a table of pairs')}")
     try:
