@@ -15,7 +15,7 @@ from pathlib import Path
 
 import calib_core
 from cocalib.cli.commands import COMMANDS
-from cocalib.cli.help import named_options_help, written_help
+from cocalib.cli.help import named_options_help, short_help
 
 _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
@@ -40,7 +40,7 @@ def _commands() -> Iterator[str]:
     """Yield the page of the commands."""
     yield "# Commands\n\n`--help all` after a command lists every option; options by name are at the end.\n"
     for command in COMMANDS.values():
-        yield f"## {command.name}\n\n```text\n{written_help(command)}```\n"
+        yield f"## {command.name}\n\n```text\n{short_help(command)}```\n"
     yield f"## Options by name\n\n```text\n{named_options_help(COMMANDS['solve'].load())}```\n"
 
 

@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
@@ -58,7 +58,7 @@ from calib_core.interchange.syntax.strict_json import (
     json_object,
     json_text,
 )
-from calib_core.measurements import Candidate, Pair, ReflectorClick
+from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions
 from calib_core.parsing import json_value
 from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
@@ -81,7 +81,6 @@ def calibration_text(
     frames: FrameNames | None = None,
     provenance: Provenance | None = None,
     *,
-    clicks: Iterable[ReflectorClick] = (),
     vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a solved calibration as calibration-1 text; the same input gives the same bytes, never NaN.
@@ -90,10 +89,9 @@ def calibration_text(
         calibration: what the solver returned.
         frames: the names of the two frames; None uses "radar" and "camera_optical".
         provenance: where it comes from.
-        clicks: for pairs without a frame stamp, the stamp of the click with the same id is used.
         vehicle: which vehicle it is of; None if nobody said.
     """
-    return write_calibration(calibration_file(calibration, frames, provenance, clicks=clicks, vehicle=vehicle))
+    return write_calibration(calibration_file(calibration, frames, provenance, vehicle=vehicle))
 
 
 def calibration_file(
@@ -101,23 +99,16 @@ def calibration_file(
     frames: FrameNames | None = None,
     provenance: Provenance | None = None,
     *,
-    clicks: Iterable[ReflectorClick] = (),
     vehicle: VehicleNote | None = None,
 ) -> CalibrationFile:
     """Return the content of a calibration-1 file: the calibration with its frames, a check point and its provenance."""
-    times = {click.id: click.image_time for click in clicks}
-    pairs = tuple(
-        pair if pair.image_time is not None else dataclasses.replace(pair, image_time=times.get(pair.id))
-        for pair in calibration.pairs
-    )
-    stamped = dataclasses.replace(calibration, pairs=pairs)
     unconfirmed = sum(not assumption.confirmed for assumption in provenance.assumptions) if provenance else 0
     return CalibrationFile(
-        calibration=stamped,
+        calibration=calibration,
         frames=frames or FrameNames(),
-        check_point=choose_check_point(stamped),
+        check_point=choose_check_point(calibration),
         provenance=provenance or Provenance(),
-        verdict=stated_verdict(verdict_on(stamped, unconfirmed=unconfirmed)),
+        verdict=stated_verdict(verdict_on(calibration, unconfirmed=unconfirmed)),
         evidence="automatic" if provenance is not None and provenance.unconfirmed is not None else "clicked",
         vehicle=vehicle or VehicleNote(),
     )

@@ -279,16 +279,6 @@ def test_the_check_point_is_the_inlier_nearest_to_the_image_centre(golden_text):
     np.testing.assert_allclose(check.pixel_px, calibration.reproject(check.radar_m[None])[0], atol=1e-9)
 
 
-def test_the_stamp_of_a_pair_comes_from_its_click_where_the_pair_has_none(golden_text):
-    calibration = read_calibration(golden_text).calibration
-    bare = dataclasses.replace(calibration, pairs=(dataclasses.replace(calibration.pairs[0], image_time=None),))
-    click = ReflectorClick(time_from_parts(12, 5), "c1", 0.0, 0.0)
-
-    content = json.loads(calibration_text(bare, clicks=[click]))
-
-    assert content["pairs"][0]["image_time"] == {"sec": 12, "nanosec": 5}
-
-
 # What a clicks-1 file says of clicks that nobody confirmed.
 
 
