@@ -11,12 +11,12 @@ as the rows of a grid, that is a shift which most pairs agree on; only the ends 
 clicks are also tried with the returns of the placements after and before their own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Points3, TimesNs, Values
+from calib_core.arrays import Indices, Points3, TimesNs, Values
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.gating import static_returns
 from calib_core.camera import Camera
@@ -43,6 +43,11 @@ _STEP_S = 0.05
 _AROUND_S = 4.0  # as far as the scans around a click reach by default
 _MOST_STEPS = 3  # placements tried where the pose may be turned, which takes a fit each
 _MOST_CHEAP_STEPS = 20  # where it is not: the longest row
+_SCALES_APART_S = (
+    ("TAI and UTC before July 2015", 35.0), ("TAI and UTC before 2017", 36.0), ("GPS time and UTC", 18.0), ("TAI and UTC", 37.0),
+)  # fmt: skip
+"""The likeliest last: of those that fit alike, the last is named."""
+_WITHIN_DWELL_S = 4.0  # a reflector that stands still as long as it is asked to has stood for this long about a click
 _LEAST_APART = 2
 _LEAST_AGREEING = 8
 _AGREEING_SHARE = 0.7
@@ -112,39 +117,70 @@ def clocks_apart(
     sound = fit is not None and agreeing > _SOUND_SHARE * len(pairs) and fit.noise_scale.max() < _SOUND_NOISE
     if len(pairs) - agreeing < _LEAST_APART:
         return []
-    best, count, step = agreeing, len(pairs), 0
+    best, chosen = agreeing, None
     rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
     points_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])
-    most = _MOST_CHEAP_STEPS if sound else _MOST_STEPS
-    for tried in (sign * size for size in range(1, most + 1) for sign in (1, -1)):
-        left = len(pairs) - abs(tried)
+    for tried in _deals(np.array(times, dtype=np.int64), sound=sound):
+        left = len(tried.clicks)
         if left < max(_LEAST_AGREEING, best):
             continue
-        clicks, seen = (slice(max(0, way), max(0, way) + left) for way in (-tried, tried))
+        clicks, seen = tried.clicks, tried.seen
         if fit is not None and sound and _most_once_shifted(rays[clicks], points_m[seen], fit.camera_from_radar) < best:
             continue
-        moved = [replace(a, candidates=b.candidates) for a, b in zip(pairs[clicks], pairs[seen], strict=True)]
+        moved = [replace(pairs[a], candidates=pairs[b].candidates) for a, b in zip(clicks, seen, strict=True)]
         other = quick_fit(pair_measurements(moved, camera, options), options, None)
         found = 0 if other is None or other.noise_scale.max() > _LARGEST_NOISE else int(other.inliers.sum())
-        more = 0 if found == left else _MORE_AGREEING
+        more = 0 if found == left or (tried.scales and chosen) else _MORE_AGREEING
         if found >= max(_LEAST_AGREEING, best + more, _AGREEING_SHARE * left):
-            best, count, step = found, left, tried
-    if not step:
+            best, chosen = found, tried
+    if chosen is None:
         return []
-    apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
-    return [
-        DataWarning(
-            "clocks-apart",
-            {
-                "shifted_agreeing": best,
-                "shifted_clicks": count,
-                "placements": step,
-                "agreeing": agreeing,
-                "clicks": len(pairs),
-                "apart_s": float(np.copysign(apart_s, step)),
-            },
-        )
-    ]
+    facts = {
+        "shifted_agreeing": best,
+        "shifted_clicks": len(chosen.clicks),
+        "placements": chosen.placements,
+        "agreeing": agreeing,
+        "clicks": len(pairs),
+        "apart_s": chosen.apart_s,
+    }
+    return [DataWarning("clocks-apart", facts | ({"scales": chosen.scales} if chosen.scales else {}))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Deal:
+    """Clicks with the returns of other placements, as another clock of the radar would give them.
+
+    Attributes:
+        clicks: (n,) rows of the clicks.
+        seen: (n,) rows of the pairs whose returns they get.
+        placements: by how many placements these are later.
+        apart_s: by how much later [s].
+        scales: the time scales that are as far apart; "" if none are.
+    """
+
+    clicks: Indices
+    seen: Indices
+    placements: int
+    apart_s: float
+    scales: str = ""
+
+
+def _deals(times_ns: TimesNs, *, sound: bool) -> Iterator[_Deal]:
+    """Yield the deals to try: placement by placement, then the offsets between time scales."""
+    rows, times_s = np.arange(len(times_ns)), (times_ns - times_ns[0]) / NS_PER_S
+    for size in range(1, (_MOST_CHEAP_STEPS if sound else _MOST_STEPS) + 1):
+        early, late = rows[:-size], rows[size:]
+        apart_s = float(np.median(times_ns[late] - times_ns[early])) / NS_PER_S if len(late) else 0.0
+        yield from (_Deal(early, late, size, apart_s), _Deal(late, early, -size, -apart_s))
+    for scales, size_s in _SCALES_APART_S:
+        for apart_s in (size_s, -size_s):
+            away_s = np.abs(times_s[None, :] - times_s[:, None] - apart_s)
+            nearest = away_s.argmin(axis=1)
+            clicks = rows[away_s.min(axis=1) < _WITHIN_DWELL_S]
+            seen = nearest[clicks]
+            placements = int(np.median(seen - clicks)) if len(clicks) else 0
+            if placements:
+                yield _Deal(clicks, seen, placements, apart_s, scales)
 
 
 def _most_once_shifted(rays: Points3, points_m: Points3, pose: RigidTransform) -> int:

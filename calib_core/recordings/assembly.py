@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.measurements import DataWarning, Stamp, TimeNs
+from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
@@ -50,6 +50,8 @@ from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
 from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, StampedTopic, Topic, TopicSummary, join_topics, read_stamps
 
+_MOST_LATE_S = 1e10
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
@@ -71,6 +73,7 @@ class Assembly:
     assumptions: tuple[Assumption, ...]
     confirmed: bool
     column_map: tuple[str, ...]
+    radar_late_s: float
 
     @property
     def used(self) -> frozenset[str]:
@@ -103,6 +106,8 @@ def assemble(
         RecordingError: the recording lacks what the options ask for.
     """
     name = " + ".join(str(path) for path in paths)
+    if not abs(options.radar_late) <= _MOST_LATE_S:
+        raise RecordingError(f"--radar-late {options.radar_late:g}: give seconds, at most {_MOST_LATE_S:.0e}")
     topics, repeated = join_topics(sources, before.used if before else None)
     warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
@@ -157,6 +162,7 @@ def assemble(
         assumptions=assumptions,
         confirmed=options.confirm_assumptions,
         column_map=tuple(one.words for one in stated.column_map),
+        radar_late_s=options.radar_late,
     )
 
 
@@ -257,6 +263,9 @@ def _clocks(
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of the radar, all of whose topics share it, and of the camera; return clocks and times by topic."""
     read = {topic.name: _both_clocks(stamped[topic.name], inventory) for topic in used.all}
+    if options.radar_late:
+        late_ns = round(options.radar_late * NS_PER_S)
+        read |= {topic.name: read[topic.name].earlier(late_ns) for topic in used.radars}
     if options.clock == "header":
         for both in read.values():
             if both.header_ns is None:

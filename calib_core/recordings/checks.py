@@ -22,6 +22,7 @@ _MIN_ANGLE_RAD = 0.02
 _MIRROR = "--radar-axes forward,right,up"
 _SAMPLED_SCANS = 12
 _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
+_HOURS_S = range(-14 * 3600, 14 * 3600 + 1, 3600)
 
 
 def about_claims(radar: RadarStream) -> list[DataWarning]:
@@ -187,6 +188,8 @@ def check_overlap(
         hours, minutes = divmod(abs(offset_s) // 60, 60)
         zone = f"{'-' if offset_s < 0 else '+'}{hours:02d}:{minutes:02d}"
         hint = f"the dates of {local[0]} have no time zone; with --time-zone {zone} they overlap"
+    elif (hours_s := _zone_between(a, b, _HOURS_S)) is not None:
+        hint = f"they overlap if the radar's clock is {hours_s // 3600:+d} h off, as of another time zone: --radar-late {hours_s}"
     if required:
         raise RecordingError(f"{name}: {what}; {hint}")
     return [DataWarning.reported("no-overlap", what, hint)]
@@ -215,17 +218,17 @@ def without_certain_zone(
     )
 
 
-def _zone_between(local_ns: TimesNs, others_ns: TimesNs) -> int | None:
+def _zone_between(local_ns: TimesNs, others_ns: TimesNs, zones_s: range = _ZONES_S) -> int | None:
     """Return the offset from UTC [s] with which local times overlap the others most; None if none does."""
-    overlaps = _zone_overlaps(local_ns, others_ns)
+    overlaps = _zone_overlaps(local_ns, others_ns, zones_s)
     best = max(overlaps, key=lambda offset_s: (overlaps[offset_s], offset_s % 3600 == 0))
     return best if overlaps[best] >= 0 else None
 
 
-def _zone_overlaps(local_ns: TimesNs, others_ns: TimesNs) -> dict[int, int]:
+def _zone_overlaps(local_ns: TimesNs, others_ns: TimesNs, zones_s: range = _ZONES_S) -> dict[int, int]:
     """Return for each offset from UTC [s] for how long [ns] local times overlap the others; negative if they do not."""
     overlaps = {}
-    for offset_s in _ZONES_S:
+    for offset_s in zones_s:
         low, high = (int(end) - offset_s * NS_PER_S for end in (local_ns[0], local_ns[-1]))
         overlaps[offset_s] = min(high, int(others_ns[-1])) - max(low, int(others_ns[0]))
     return overlaps

@@ -14,7 +14,7 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import name_text, no_such, special_kind
-from calib_core.measurements import Boxes, DataWarning, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, Boxes, DataWarning, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.box_topics import boxes_in_topic
 from calib_core.recordings.camera.image_stream import ImageStream
@@ -189,7 +189,17 @@ class Recording:
     @property
     def radar_notes(self) -> tuple[str, ...]:
         """What else the user should know about the radar's messages, as sentences without their final periods."""
-        return self._assembly.radar.layout.plan.notes if self._assembly.radar else ()
+        return (*self.radar_clock_notes, *(self._assembly.radar.layout.plan.notes if self._assembly.radar else ()))
+
+    @property
+    def radar_clock_notes(self) -> tuple[str, ...]:
+        """What the user's --radar-late does, as a sentence without its final period; empty if it is not given."""
+        late_s = self._assembly.radar_late_s
+        side, change = ("late", "reduced") if late_s > 0 else ("early", "increased")
+        words = (
+            f"the radar's stamps are {abs(late_s):.9g} s too {side}, and {change} by that (--radar-late {late_s:.9g})"
+        )
+        return (words,) if late_s else ()
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
@@ -247,7 +257,9 @@ class Recording:
     @property
     def radar_delay_ns(self) -> int:
         """The median time from a scan's stamp to its arrival [ns]; 0 by receive time or without a radar."""
-        return self._assembly.radar.parts[0].delay_ns if self._assembly.radar else 0
+        if self._assembly.radar is None:
+            return 0
+        return self._assembly.radar.parts[0].delay_ns - round(self._assembly.radar_late_s * NS_PER_S)
 
     @property
     def radar_sensors(self) -> tuple[RadarSensor, ...]:

@@ -213,6 +213,10 @@ class RecordingOptions:
         "auto",
         "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",
     )
+    radar_late: float = option(
+        0.0,
+        "By how many seconds the radar's stamps are too late, which are reduced by it; negative if they are too early.",
+    )
     no_recording_file: bool = option(False, "Ignore a recording.toml beside the recording.")
 
 

@@ -1,6 +1,6 @@
 """What is said where there is no calibration, or where a click has no radar position: a row for each code, as for warnings."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from calib_core.json_forms import Name
@@ -179,6 +179,13 @@ def in_sentences(stated: DataWarning | Unsolvable | Unpaired) -> Words:
     """Return message and hint, a sentence each."""
     said = remark_on(stated)
     return join((sentence(said.message), sentence(said.hint)))
+
+
+def by_cause(unpaired: Sequence[Unpaired]) -> Iterator[tuple[tuple[str, ...], Unpaired]]:
+    """Yield the ids of the clicks that have no radar position for one cause, and the first of them."""
+    for code in dict.fromkeys(click.code for click in unpaired):
+        alike = [click for click in unpaired if click.code == code]
+        yield tuple(click.id for click in alike), alike[0]
 
 
 @dataclass(frozen=True, slots=True)

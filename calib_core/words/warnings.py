@@ -304,10 +304,17 @@ def clock_bias_suspected(*, ids: Sequence[str], clicks: int, offset_s: float) ->
 
 
 def clocks_apart(
-    *, shifted_agreeing: int, shifted_clicks: int, placements: int, agreeing: int, clicks: int, apart_s: float
+    *,
+    shifted_agreeing: int,
+    shifted_clicks: int,
+    placements: int,
+    agreeing: int,
+    clicks: int,
+    apart_s: float,
+    scales: str = "",
 ) -> Remark:
-    """Given when two more clicks agree with what the radar saw some placements later or earlier than with what it saw at
-    their time; or all do that have such a placement, and no fewer.
+    """Given when two more clicks agree with what the radar saw some placements, or 18 or 35 to 37 s, later or earlier than with
+    what it saw at their time; or all do that have such a placement, and no fewer.
 
     Could also be: see below.
     """
@@ -315,13 +322,15 @@ def clocks_apart(
     later, ahead = ("later", "ahead of") if placements > 0 else ("earlier", "behind")
     return remark(
         f"{shifted_agreeing} of {shifted_clicks} clicks agree with what the radar saw {away} {later}, {agreeing} of {clicks} "
-        f"with what it saw at their time: its stamps seem to be about {abs(apart_s):.0f} s {ahead} the camera's",
+        f"with what it saw at their time: its stamps seem to be about {abs(apart_s):.0f} s {ahead} the camera's"
+        + (f", as {scales} are" if scales else ""),
         say(
             "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt: {receive}; "
-            "else correct the stamps of one recording",
+            "else say by how many seconds the radar's stamps are late: {late}",
             receive=option("clock", "receive"),
+            late=option("radar_late", f"{apart_s:.0f}"),
         ),
-        SetOption("clock", "receive"),
+        SetOption("radar_late", f"{apart_s:.0f}") if scales else SetOption("clock", "receive"),
     )
 
 

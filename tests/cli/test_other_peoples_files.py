@@ -72,3 +72,15 @@ def test_pairs_in_the_spellings_of_other_tools_give_the_pose(cocalib, cases, sam
     calibration = read_calibration(out.read_text()).calibration
     assert sum(pair.inlier for pair in calibration.pairs) == 20
     assert ("assumed" in {one.code for one in calibration.warnings}) == (case.startswith("60"))
+
+
+def test_a_radar_whose_clock_is_another_time_scale_is_named_and_can_be_corrected(cocalib, cases, sample, tmp_path):
+    out, bags = tmp_path / "c.json", (cases / "09-clock-37-s" / "radar.bag", sample / "camera.bag")
+    answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", out)
+    assert answer.code in (0, 3)
+    assert "TAI and UTC" in answer.out
+    assert "--radar-late -37" in answer.out
+    answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", out, "--radar-late", "-37")
+    assert answer.code == 0
+    assert "--radar-late -37" in answer.err
+    assert error_of(out, sample) < (0.15, 1.5)

@@ -28,11 +28,12 @@ def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -
         outcome: of the solver, or of the search for proposals.
         what: is missing.
     """
-    from calib_core.words.outcomes import in_sentences
+    from calib_core.words.outcomes import by_cause, in_sentences
+    from calib_core.words.text import listed
 
     print(f"cocalib: {what}: {on_terminal(in_sentences(outcome))}", file=sys.stderr)
-    for click in outcome.unpaired:
-        print(f"  click {click.id}: {on_terminal(in_sentences(click))}", file=sys.stderr)
+    for ids, first in by_cause(outcome.unpaired):
+        print(f"  {on_terminal(listed(ids))}: {on_terminal(in_sentences(first))}", file=sys.stderr)
     return 1
 
 
@@ -45,6 +46,7 @@ _FLAGS = {
     "method": "--method",
     "radar_axes": "--radar-axes",
     "clock": "--clock",
+    "radar_late": "--radar-late",
     "solving.camera_position": "--camera-position-m",
 }
 
@@ -145,6 +147,7 @@ def tell_choices(recording: "Recording") -> None:
             print(f"{what}: {choice}", file=sys.stderr)
     from calib_core.words.warnings import told
 
+    _tell_notes(recording.radar_clock_notes)
     _tell_notes([str(told(warning).message) for warning in recording.damage])
 
 

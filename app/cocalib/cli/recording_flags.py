@@ -46,6 +46,7 @@ class TopicFlags(RecordingOptions):
     video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
     time_zone: Annotated[str | None, called("OFFSET")] = same(RecordingOptions, "time_zone")
     radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
+    radar_late: Annotated[float, called("SECONDS")] = same(RecordingOptions, "radar_late")
     no_recording_file: Annotated[bool, called()] = same(RecordingOptions, "no_recording_file")
 
     def open(self, paths: Sequence[Path], require: "Sequence[Need]" = ("radar", "image")) -> "Recording":

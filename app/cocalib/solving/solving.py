@@ -318,7 +318,10 @@ def calibration_text(
         video_start=recording.video_start,
         version=version(),
         column_map=recording.column_map,
-        assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
+        assumptions=(
+            *(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
+            *(AssumptionNote(note, True) for note in recording.radar_clock_notes),
+        ),
         unconfirmed=unconfirmed,
     )
     return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)

@@ -21,8 +21,8 @@ from calib_core.results.actions import (
     SetOption,
 )
 from calib_core.results.verdict import SURE_PAIRS, Verdict, by_consequence, consequence_of, stated_error, verdict_on
-from calib_core.words.outcomes import in_sentences
-from calib_core.words.text import Words, named, say, sentence, words
+from calib_core.words.outcomes import by_cause, in_sentences
+from calib_core.words.text import Words, listed, named, say, sentence, words
 from calib_core.words.verdict import (
     action_of,
     action_words,
@@ -187,21 +187,24 @@ def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
     lines += rows
     lines += ["uncertainty: " + line for line in uncertainty_sentences(calibration)]
     lines += ["intrinsics: " + words(line) for line in refined_sentences(calibration)]
+    disagreeing = [pair for pair in calibration.pairs if not pair.inlier and not pair.excluded and pair.rival < 0]
     lines += [
         say(
             "disagrees: {pair}: {distance} px from its radar position",
             pair=named(pair.id),
             distance=plain(pair.distance_px),
         )
-        for pair in calibration.pairs
-        if not pair.inlier and not pair.excluded and pair.rival < 0
+        for pair in disagreeing[:_MOST_NAMED]
     ]
+    left = len(disagreeing) - _MOST_NAMED
+    lines += [words(f"disagree: {left} more")] if left > 0 else []
     lines += [
         "warning: " + in_sentences(warning)
         for warning in by_consequence(calibration.warnings)
         if warning is not verdict.cause
     ]
-    lines += [say("unpaired: {pair}: {why}", pair=named(row.id), why=in_sentences(row)) for row in calibration.unpaired]
+    for ids, first in by_cause(calibration.unpaired):
+        lines.append(say("unpaired: {pairs}: {why}", pairs=listed(ids), why=in_sentences(first)))
     return tuple(lines)
 
 
@@ -223,6 +226,7 @@ def _line(figure: Figure, width: int) -> str:
 
 
 _SAME_M = 0.5
+_MOST_NAMED = 6
 _OF_PAIRS = ("doubtful-pair", "agreeing-outliers", "many-outliers")
 
 

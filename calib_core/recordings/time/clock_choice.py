@@ -5,7 +5,7 @@ other sensor must then not silently stay on a different clock. Receive times tha
 only where the stamps are worse.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -53,6 +53,15 @@ class Stamps:
         """Median of receive time minus stamp [ns]."""
         assert self.header_ns is not None
         return float(np.median(self.receive_ns - self.header_ns))
+
+    def earlier(self, by_ns: int) -> "Stamps":
+        """Return the stamps reduced by a time, and the receive times if they are of the same clock; stamps of zero stay."""
+        same_clock = self.header_ns is None or not len(self.receive_ns) or abs(self.offset_ns) < NS_PER_S
+        return replace(
+            self,
+            receive_ns=self.receive_ns - by_ns if same_clock else self.receive_ns,
+            header_ns=None if self.header_ns is None else np.where(self.header_ns == 0, 0, self.header_ns - by_ns),
+        )
 
 
 def header_fault(stamps: Stamps) -> str | None:

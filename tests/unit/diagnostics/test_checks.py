@@ -428,6 +428,16 @@ def test_stamps_that_are_a_placement_off_are_found(rooftop, ahead_s):
     assert told(warning).action == SetOption("clock", "receive")
 
 
+@pytest.mark.parametrize("ahead_s", [37.0, -37.0, 18.0, -18.0])
+def test_clocks_of_two_time_scales_are_named_with_the_seconds(rooftop, ahead_s):
+    clicks, scans, camera = rooftop
+    moved_scans = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
+    outcome = calibrate(clicks, moved_scans, camera)
+    (warning,) = clocks_apart(outcome.suspected if isinstance(outcome, Unsolvable) else outcome.warnings[:1])
+    assert warning.facts["apart_s"] == ahead_s
+    assert told(warning).action == SetOption("radar_late", f"{ahead_s:.0f}")
+
+
 ROWS, PER_ROW = 4, 6
 
 

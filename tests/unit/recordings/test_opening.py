@@ -10,6 +10,7 @@ import pytest
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import RecordingOptions, inspect_recording, open_recording
+from calib_core.recordings.recording_file import recording_file_of
 
 START_NS = 1_700_000_000 * NS_PER_S
 
@@ -211,6 +212,24 @@ def test_sensors_that_do_not_overlap_in_time_are_refused_with_both_intervals(ros
     assert "86398.1 s apart" in text
     with inspect_recording([radar, camera]) as recording:
         assert [warning.code for warning in recording.warnings] == ["no-overlap"]
+
+
+def test_recordings_whole_hours_apart_are_brought_together_by_the_radars_lateness(ros, write, plain, jpeg):
+    hours_ns = 3 * 3600 * NS_PER_S
+    radar = write(ros, [row for row in plain(ros, jpeg) if "radar" in row[0]], name="radar")
+    later = [(t, at + hours_ns, m) for t, at, m in plain(ros, jpeg, camera_shift_ns=hours_ns) if "camera" in t]
+    camera = write(ros, later, name="camera")
+    assert "--radar-late -10800" in refusal([radar, camera])
+    with open_recording([radar], require=("radar",)) as recording:
+        stamps = recording.radar_times
+    with open_recording([radar, camera], RecordingOptions(radar_late=-10800.0)) as recording:
+        np.testing.assert_array_equal(recording.radar_times, stamps + hours_ns)
+        assert "--radar-late -10800" in recording.radar_notes[0]
+    recording_file_of(radar).write_text("radar_late = -10800\n")
+    with open_recording([radar, camera]) as recording:
+        np.testing.assert_array_equal(recording.radar_times, stamps + hours_ns)
+    with pytest.raises(RecordingError, match="--radar-late nan"):
+        open_recording([radar, camera], RecordingOptions(radar_late=float("nan")))
 
 
 def test_a_damaged_definition_of_another_topic_does_no_harm(ros1, write, plain, jpeg):
