@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from calib_core.geometry import (
     RigidTransform,
-    euler_from_rotation,
     matrix_from_quaternion_wxyz,
     quaternion_wxyz_from_matrix,
     rotation_angle_rad,
@@ -120,10 +119,9 @@ def test_a_quaternion_holds_the_same_rotation_as_scipys(vector):
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi / 2, math.pi / 2), st.floats(-math.pi, math.pi))
-def test_euler_angles_agree_with_scipys_fixed_axes_and_come_back(x_rad, y_rad, z_rad):
+def test_euler_angles_agree_with_scipys_fixed_axes(x_rad, y_rad, z_rad):
     rotation = rotation_from_euler(x_rad, y_rad, z_rad)
     np.testing.assert_allclose(rotation, Rotation.from_euler("xyz", [x_rad, y_rad, z_rad]).as_matrix(), atol=1e-14)
-    np.testing.assert_allclose(rotation_from_euler(*euler_from_rotation(rotation)), rotation, atol=1e-8)
 
 
 @given(transforms(), transforms())

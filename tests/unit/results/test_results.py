@@ -12,7 +12,7 @@ from calib_core.errors import InputError, OptionError, UnsolvableError
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
-from calib_core.results.metrics import acc, aed, cdsd, inside_boxes, metrics_of, rms
+from calib_core.results.metrics import acc, aed, cdsd, metrics_of, rms
 from calib_core.words.outcomes import said_of
 
 POINT = np.array([[8.0, 0.5, 0.0]])
@@ -189,17 +189,6 @@ def test_without_held_out_pairs_that_figure_is_unknown():
     metrics = metrics_of(LENGTHS)
     assert math.isnan(metrics.held_out_aed_px)
     assert metrics.acc is None
-
-
-def test_a_pixel_on_a_box_edge_is_inside_and_one_past_it_is_not():
-    boxes = np.array([[10.0, 20.0, 30.0, 40.0], [100.0, 100.0, 110.0, 110.0]])
-    pixels = np.array([[10.0, 40.0], [9.99, 30.0], [105.0, 105.0], [20.0, 105.0], [np.nan, 30.0]])
-    assert inside_boxes(pixels, boxes).tolist() == [True, False, True, False, False]
-
-
-def test_no_boxes_contain_no_pixel():
-    assert inside_boxes(np.array([[1.0, 2.0]]), np.zeros((0, 4))).tolist() == [False]
-    assert inside_boxes(np.zeros((0, 2)), np.array([[0.0, 0.0, 1.0, 1.0]])).tolist() == []
 
 
 def test_acc_without_any_frame_is_unknown():
