@@ -18,10 +18,6 @@ _COMPRESSED_NAMES = frozenset({"format", "data"})
 _PACKET_NAMES = frozenset({"encoding", "pts", "flags", "data"})
 _JPEG_QUALITY = 95
 _MAX_PIXELS = 200_000_000
-READABLE = (
-    "jpeg, png, mono8, mono16, rgb8, bgr8, rgba8, bgra8, their 16-bit kinds, bayer_*8, bayer_*16, yuv422, yuv422_yuy2 and "
-    "H.264 are supported"
-)
 _DEPTH = ("16UC1", "32FC1", "16SC1")
 
 
@@ -122,10 +118,10 @@ class ImageLayout:
             file = self._file(message)
             return file.width_px, file.height_px
         try:
-            pixels = raw_pixels(message)
+            raw_pixels(message)
         except MessageError as error:
             raise self._refused(str(error)) from error
-        return pixels.shape[1], pixels.shape[0]
+        return message.whole("width"), message.whole("height")
 
     def size_in_head(self, head: bytes) -> tuple[int, int] | None:
         """Return width and height from the first bytes of a message; None if they are further on or cannot be read."""
@@ -246,11 +242,19 @@ def encoded_pixels(image: np.ndarray) -> EncodedImage:
 
 @dataclass(frozen=True, slots=True)
 class _Encoding:
-    """Channels of a pixel, bytes per channel, and the name of OpenCV's conversion to blue, green, red ("" for none)."""
+    """How pixels are stored.
+
+    Attributes:
+        channels: of a pixel.
+        conversion: the name of OpenCV's conversion to blue, green, red; "" for none.
+        channel_bytes: of each channel.
+        planes: rows that are stored for each row of the image.
+    """
 
     channels: int
     conversion: str
     channel_bytes: int = 1
+    planes: float = 1.0
 
 
 def _bayer(bits: int) -> dict[str, _Encoding]:
@@ -270,7 +274,10 @@ _ENCODINGS: Mapping[str, _Encoding] = {
     **_bayer(8), **_bayer(16),
     "yuv422": _Encoding(2, "COLOR_YUV2BGR_UYVY"), "uyvy": _Encoding(2, "COLOR_YUV2BGR_UYVY"),
     "yuv422_yuy2": _Encoding(2, "COLOR_YUV2BGR_YUYV"), "yuyv": _Encoding(2, "COLOR_YUV2BGR_YUYV"),
+    "nv12": _Encoding(1, "COLOR_YUV2BGR_NV12", planes=1.5), "nv21": _Encoding(1, "COLOR_YUV2BGR_NV21", planes=1.5),
 }  # fmt: skip
+_PLAIN = (name for name in _ENCODINGS if not name.startswith("bayer"))
+READABLE = f"jpeg, png, {', '.join(_PLAIN)}, bayer_*8, bayer_*16, H.264 and H.265 are supported"
 
 
 def check_size(width: int, height: int) -> None:
@@ -286,7 +293,7 @@ def check_size(width: int, height: int) -> None:
 
 
 def raw_pixels(message: Message) -> np.ndarray:
-    """View raw pixels as (h, w, channels), uint8 or uint16, without row padding.
+    """View raw pixels as (h, w, channels), uint8 or uint16, without row padding; h counts rows of all planes.
 
     Raises:
         MessageError: the encoding is not supported, or the sizes contradict each other.
@@ -298,12 +305,16 @@ def raw_pixels(message: Message) -> np.ndarray:
     encoding = _ENCODINGS[name]
     height, width, step = message.whole("height"), message.whole("width"), message.whole("step")
     check_size(width, height)
+    if encoding.planes > 1.0 and (width % 2 or height % 2):
+        raise MessageError(f"an image of {width} x {height} {name} pixels must have an even width and height")
+    height = round(height * encoding.planes)
     row = width * encoding.channels * encoding.channel_bytes
     step = step or row
     data = message.octets("data")
     if step < row or len(data) < step * (height - 1) + row:
         raise MessageError(
-            f"an image of {width} x {height} {name} pixels with rows of {step} bytes has {len(data)} bytes of data, but "
+            f"an image of {width} x {message.whole('height')} {name} pixels with rows of {step} bytes has {len(data)} bytes of "
+            "data, but "
             f"{step * (height - 1) + row} are required, with rows of at least {row}: the message is damaged"
         )
     rows = np.ndarray((height, row), np.uint8, np.ascontiguousarray(data), 0, (step, 1))

@@ -1,5 +1,6 @@
 """Read the recorded intrinsics (sensor_msgs/CameraInfo) and check them against the images."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,9 @@ from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.topics import Topic
+
+_WITHOUT_DISTORTION = ("pinhole", "none", "rectified", "perspective", "undistorted", "no_distortion")
+"""Names in messages of a lens without distortion, whose coefficients must say the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +50,7 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
     matrix = message.numbers("K" if upper else "k", 9).reshape(3, 3)
     projection = message.numbers("P" if upper else "p", 12).reshape(3, 4)
     distortion = message.numbers("D" if upper else "d", message.count("D" if upper else "d"))
-    model_name = message.text("distortion_model").strip().lower()
+    model_name = re.sub(r"[\W_]+", "_", message.text("distortion_model").strip().lower())
     if rectified and projection[0, 0] > 0:
         matrix, distortion, model_name = projection[:, :3].copy(), np.zeros(0), ""
     if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and np.all(np.isfinite(matrix))):
@@ -74,6 +78,8 @@ def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray]
     """Return the lens model and its coefficients, or a phrase saying what is wrong."""
     if not np.all(np.isfinite(distortion)):
         return "has distortion coefficients that are not numbers"
+    if name in _WITHOUT_DISTORTION and not np.any(distortion):
+        name = ""
     lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
     if lens is None:
         return f"has unknown lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are supported"

@@ -166,7 +166,7 @@ def definition_of(channel: Channel) -> Definition:
     encoding: Encoding = "ros1" if channel.encoding == "ros1" else "cdr"
     name = short_type(channel.type)
     text, form = channel.definition, channel.definition_format
-    if form == "":
+    if form == "" or not text.strip():
         if name not in KNOWN_DEFINITIONS:
             raise MessageError(
                 f"topic {channel.topic}: the recording has no definition of {channel.type}, and the type is unknown; "

@@ -81,6 +81,8 @@ _AS_MAPPED = {
 _POLAR = ("range", "azimuth", "elevation")
 _INVALID_POSITION = ("invalid_distance", "invalid_range", "invalid_azimuth", "invalid_elevation")
 _INVALID_DOPPLER = ("invalid_range_rate", "invalid_doppler", "invalid_velocity")
+VALID = ("valid", "is_valid", "b_valid", "measured", "is_measured")
+"""Flags that are 0 where a slot of a list holds no return."""
 _LONGEST_NAME = 500
 """No name of a column is longer; the patterns take the cube of the length of what is none."""
 _IN_BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
@@ -764,9 +766,7 @@ class _Guess:
     def flags(self, plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
         """Use the flags of invalid values, and mention several sensors and second hypotheses."""
         names = {column.name.lower(): column for column in columns}
-        flags = [
-            column for column in columns if column.name.lower().rpartition(".")[2] in ("valid", "is_valid", "b_valid")
-        ]
+        flags = [column for column in columns if column.name.lower().rpartition(".")[2] in VALID]
         needed = [flag for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
         readings = [ColumnReading("valid", flag.name, "", "", "returns where it is 0 are skipped") for flag in needed]
         readings += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]

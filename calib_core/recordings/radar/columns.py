@@ -160,7 +160,7 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     for flag in plan.spoils_doppler:
         doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
     lost = ~(np.abs(position) <= _FARTHEST_M).all(axis=1)
-    position[lost] = np.nan
+    position[lost | ~position.any(axis=1)] = np.nan  # at the radar itself there is none: an empty slot
     for flag in plan.spoils_position:
         invalid = column(flag).reshape(-1) != 0
         position[invalid], lost[invalid] = np.nan, False

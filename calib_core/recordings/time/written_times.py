@@ -140,9 +140,14 @@ def parse_zone(text: str | None) -> int | None:
         raise RecordingError(f"--time-zone {text}: give an offset from UTC such as +02:00, or UTC") from None
 
 
+_YEAR_S = 365 * 86_400
+
+
 def utc(time: TimeNs) -> str:
-    """Format a stamp as UTC date and time with milliseconds."""
+    """Format a stamp as UTC date and time with milliseconds; as seconds if it counts from a start of its own, not from 1970."""
     seconds, rest = divmod(int(time), NS_PER_S)
+    if seconds < _YEAR_S:
+        return f"{seconds}.{rest // 1_000_000:03d} s"
     try:
         moment = datetime.fromtimestamp(seconds, tz=UTC)
     except (OverflowError, ValueError, OSError):

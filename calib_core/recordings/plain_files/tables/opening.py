@@ -33,6 +33,7 @@ from calib_core.recordings.plain_files.tables.times import (
     unknown_unit_error,
 )
 from calib_core.recordings.radar.column_guess import (
+    VALID,
     DescribedColumn,
     guess_columns,
     split_unit,
@@ -50,6 +51,7 @@ Table: TypeAlias = TextTable | JsonTable
 RADAR_FRAME = "radar"
 _MOST_NAMES = 8
 _SAMPLED_ROWS = 20_000
+_FLAGS = ("0", "1", "false", "true")
 _POLAR = ("range", "azimuth", "elevation")
 _POSITION = ("x", "y", "z", *_POLAR)
 
@@ -142,7 +144,11 @@ def _first_of_scans(columns: RadarColumns, times_ns: TimesNs, values: np.ndarray
 
 
 def _numbers_returns(name: str) -> bool:
-    return name.lower().rpartition(".")[2] in POINT_NUMBERS
+    return _last_word(name) in POINT_NUMBERS
+
+
+def _last_word(name: str) -> str:
+    return name.lower().rpartition(".")[2]
 
 
 def table_fault(path: Path, options: PlainOptions) -> str:
@@ -241,6 +247,7 @@ def radar_columns(table: Table, options: PlainOptions) -> RadarColumns:
         for place, name in enumerate(names)
         if name in taken
         or _numbers_returns(name)
+        or (_last_word(name) in VALID and "".join(table.first_row[place : place + 1]).strip().lower() in _FLAGS)
         or ((time is None or name != time.column) and table_meaning(name, units[place]) is not None)
     )
     try:

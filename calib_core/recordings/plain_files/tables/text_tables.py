@@ -31,6 +31,7 @@ _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
 _SAMPLED_ROWS = 2000
 _COMMENTS = ("#", "%")
+_WORDS = {**dict.fromkeys(("", "-", "na", "n/a", "null", "none"), math.nan), "false": 0.0, "true": 1.0}
 _SUSPECT = frozenset({"", " ", "\t", *_COMMENTS})
 _WRITTEN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
 
@@ -327,11 +328,8 @@ def _damaged(table: TextTable, number: int, error: Exception) -> RecordingError:
 
 
 def _number(text: str) -> float:
-    return (
-        math.nan
-        if not text or text.isspace() or text.strip().lower() in ("-", "na", "n/a", "null", "none")
-        else float(text)
-    )
+    word = text.strip().lower()
+    return _WORDS[word] if word in _WORDS else float(text)
 
 
 def _is_list(cell: str) -> bool:

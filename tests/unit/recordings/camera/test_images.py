@@ -113,6 +113,17 @@ def test_yuv_images_give_the_right_colours(ros1, write, encoding, order):
     np.testing.assert_allclose([blue, green, red], expected, atol=2)
 
 
+@pytest.mark.parametrize(("encoding", "order"), [("nv12", (90, 160)), ("nv21", (160, 90))])
+def test_images_in_two_planes_give_the_right_colours(ros1, write, encoding, order):
+    rows = np.vstack([np.full((8, 16), 130), np.tile(order, (4, 8))]).astype(np.uint8)
+    message = ros1.image(START_NS, rows, encoding, width=16, height=8)
+    with opened(write, ros1, message) as recording:
+        image = recording.image(0)
+    y, u, v = 1.164 * (130 - 16), 90 - 128, 160 - 128
+    assert image.shape == (8, 16, 3)
+    np.testing.assert_allclose(image[4, 4], [y + 2.018 * u, y - 0.391 * u - 0.813 * v, y + 1.596 * v], atol=2)
+
+
 @pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize("bits", [10, 12, 16])
 def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big, bits):
@@ -161,8 +172,8 @@ def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write):
             "the encoding '16UC1' is not supported; a depth image has no defined brightness scale, convert it to mono8",
         ),
         ("32FC1", "a depth image has no defined brightness scale"),
-        ("bayer_rggb12", "'bayer_rggb12' is not supported; jpeg, png, mono8"),
-        ("nonsense", "'nonsense' is not supported; jpeg, png, mono8"),
+        ("bayer_rggb12", "'bayer_rggb12' is not supported; jpeg, png, bgr8"),
+        ("nonsense", "'nonsense' is not supported; jpeg, png, bgr8"),
     ],
 )
 def test_unsupported_raw_encodings_are_refused_with_a_clear_error(ros, write, encoding, words):
@@ -300,6 +311,13 @@ def camera_of(write, ros, *infos, size=(640, 480), topic="/camera/image"):
         ("plumb_bob", [0.0] * 5, "pinhole", 0),
         ("rational_polynomial", [0.1, 0.2, 0, 0, 0.3, 0.4, 0.5, 0.6, 0, 0, 0, 0], "rational_polynomial", 8),
         ("equidistant", [0.1, 0.2, 0.3, 0.4], "equidistant", 4),
+        ("Plumb Bob", [-0.1, 0.02, 0.001, -0.002, 0.003], "plumb_bob", 5),
+        ("plumb'bob", [-0.1, 0.02, 0.001, -0.002, 0.003], "plumb_bob", 5),
+        ("Brown Conrady", [-0.1, 0.02, 0.001, -0.002, 0.003], "plumb_bob", 5),
+        ("Plumb Bob", [], "pinhole", 0),
+        ("pinhole", [], "pinhole", 0),
+        ("none", [0.0] * 5, "pinhole", 0),
+        ("rectified", [], "pinhole", 0),
     ],
 )
 def test_lens_models_are_read(ros, write, model, distortion, expected, coefficients):
@@ -316,6 +334,7 @@ def test_lens_models_are_read(ros, write, model, distortion, expected, coefficie
         ({"K": np.zeros(9)}, "camera-uncalibrated"),
         ({"K": np.full(9, np.nan)}, "camera-uncalibrated"),
         ({"distortion_model": "omnidirectional"}, "camera-model"),
+        ({"distortion_model": "none", "D": np.ones(5)}, "camera-model"),
         ({"D": np.ones(12)}, "camera-model"),
         ({"D": np.array([np.inf, 0, 0, 0, 0])}, "camera-model"),
         ({"distortion_model": "equidistant", "D": np.ones(2)}, "camera-model"),

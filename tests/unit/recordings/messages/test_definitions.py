@@ -1,6 +1,7 @@
 """Definitions are parsed, never executed; messages decode as rosbags decodes them."""
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import inspect_recording
+from calib_core.recordings.containers.sources import Channel
 from calib_core.recordings.messages.decoding import Message, decode
-from calib_core.recordings.messages.definitions import Field, parse_definition
+from calib_core.recordings.messages.definitions import Field, definition_of, parse_definition
 
 START_NS = 1_700_000_000 * NS_PER_S
 
@@ -101,6 +103,13 @@ def test_invalid_definitions_are_refused_with_a_clear_error(text, words):
     with pytest.raises(MessageError) as caught:
         parse_definition("test_msgs/Thing", text, "ros1")
     assert words in str(caught.value)
+
+
+def test_a_definition_of_blanks_is_none():
+    known = Channel(0, "/radar", "sensor_msgs/PointCloud2", "ros1", " \n", "msg")
+    assert "point_step" in definition_of(known).names
+    with pytest.raises(MessageError, match="topic /radar"):
+        definition_of(replace(known, type="my_msgs/Detections"))
 
 
 def test_a_definition_in_idl_is_parsed():

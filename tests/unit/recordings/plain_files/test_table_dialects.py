@@ -287,6 +287,15 @@ def test_a_table_that_does_not_say_what_it_holds_is_refused_with_what_to_write(t
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("empty", ["0,0,0,0,0,true", "0,0,0,0,0,false", "9,2,1,0,0,false"])
+def test_an_empty_slot_of_a_table_is_no_return(tmp_path, empty):
+    rows = "".join(f"{commas(*row)},true\n{row[0]},{empty}\n" for row in T.rows)
+    (tmp_path / "a.csv").write_text(f"time_ns,x_m,y_m,z_m,doppler_mps,snr_db,measured\n{rows}")
+    with open_recording(tmp_path / "a.csv", require=("radar",)) as recording:
+        points = recording.radar_scans().points_radar_m
+    np.testing.assert_allclose(points[np.isfinite(points).all(axis=1)], T.points_m)
+
+
 def test_the_columns_of_a_table_without_a_header_can_be_counted(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("".join(f"{t} {-y} {x} {z}\n" for t, x, y, z, _, _ in T.rows))
