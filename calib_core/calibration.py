@@ -20,8 +20,8 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.errors import InputError
 from calib_core.estimation import unsolved
+from calib_core.estimation.alternative_poses import find_alternatives
 from calib_core.estimation.best_fit import best_fit, quick_fit
-from calib_core.estimation.beyond_the_fit import look_beyond
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
@@ -345,8 +345,10 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     rotation_sigma_rad = float(np.sqrt(solution.uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
         return _explained(unsolved.degenerate(len(used)), used, measurements, options)
-    beyond = look_beyond(measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed)
-    solution = replace(solution, refined=beyond.refined, uncertainty=beyond.uncertainty)
+    alternatives = find_alternatives(
+        measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed
+    )
+    solution = replace(solution, refined=alternatives.refined, uncertainty=alternatives.uncertainty)
     calibration = _described(task, groups, measurements, solution)
     metrics = calibration.metrics
     solved_fit = SolvedFit(
@@ -360,7 +362,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         best=fit,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
         options=options,
-        beyond=beyond,
+        alternatives=alternatives,
     )
     angle_map = learn_angle_map(calibration)
     apart = clocks_apart(used, task.camera, options, solution.refined)

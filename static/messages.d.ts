@@ -460,7 +460,7 @@ export interface Placements {
 export type RadarReturn = [u_px: number | null, v_px: number | null, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean, x_m: number, y_m: number, z_m: number, age_s: number, azimuth_deg: number, elevation_deg: number];
 
 /** The returns of the last seconds, for a recording without images. */
-export interface RadarLook {
+export interface RadarFrame {
   type: "radar_look";
   index: number;
   returns: RadarReturn[];
@@ -513,7 +513,7 @@ export interface SpaceLegend {
 }
 
 /** What the 3D view shows, for the layer that the page draws over it. */
-export interface SpaceLook {
+export interface SpaceFrame {
   type: "space";
   number: number;
   index: number;
@@ -1203,9 +1203,9 @@ export type FromServer =
   | FramesAdded
   | FollowNote
   | Placements
-  | RadarLook
+  | RadarFrame
   | RadarMap
-  | SpaceLook
+  | SpaceFrame
   | Overlay
   | AccPanel
   | PairCandidates

@@ -17,8 +17,8 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
+from calib_core.proposing.appearance import Appearance, appearance_of, likeness_elsewhere, with_appearance
 from calib_core.proposing.dwell_views import has_changed
-from calib_core.proposing.look import Look, likeness_elsewhere, look_of, with_look
 from calib_core.words.outcomes import outcome_told
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
@@ -108,14 +108,14 @@ def proposed_again(
         CalibrationError: a frame cannot be read.
     """
     counting = [click for click in confirmed if click.counts]
-    looks = looks_of(counting, views, frames, camera)
-    found = with_look(views, looks, frames, camera)
+    looks = appearances_of(counting, views, frames, camera)
+    found = with_appearance(views, looks, frames, camera)
     return found, proposals_of(found, camera, options, confirmed=counting)
 
 
-def looks_of(
+def appearances_of(
     clicks: Sequence[ReflectorClick], views: Sequence[DwellView], frames: FrameSource, camera: Camera
-) -> list[Look]:
+) -> list[Appearance]:
     """Return what confirmed clicks show; nothing of one that lies in no dwell, or no frame of which can be read.
 
     A click beside the reflector shows nothing either: the same would be found beside the others. How large the reflector is
@@ -127,14 +127,14 @@ def looks_of(
         frames: of the camera.
         camera: the intrinsics.
     """
-    looks: list[Look] = []
+    looks: list[Appearance] = []
     for click in clicks:
         pixel_px = np.array([click.u_px, click.v_px])
         view = view_at(click.image_time, pixel_px, views)
         if view is None or beside_the_reflector(click, views) is not None:
             continue
         others = [one for one in _meanwhile(click.image_time, views) if one is not view and has_changed(one, pixel_px)]
-        shown = [look for one in (view, *others) if (look := look_of(one, frames, pixel_px)) is not None]
+        shown = [look for one in (view, *others) if (look := appearance_of(one, frames, pixel_px)) is not None]
         if len({round(float(np.log(look.larger)), 1) for look in shown}) < 2:
             looks += shown[:1]
         elif looks:
@@ -312,7 +312,7 @@ class ProposingJob:
         self._closed = False
         self._seen: tuple[DwellView, ...] = ()
         self._seen_for: ProposingWish | None = None
-        self._looks: tuple[tuple[object, ...], list[Look]] = ((), [])
+        self._appearances: tuple[tuple[object, ...], list[Appearance]] = ((), [])
         self._carried: list[DwellView] = []
         self._carried_from: list[tuple[object, ...]] = []
 
@@ -382,7 +382,7 @@ class ProposingJob:
                 return
             self._seen, self._seen_for = found[0], wish
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
-            self._looks = ((), [])
+            self._appearances = ((), [])
         self._carry(wish)
 
     def _carry(self, wish: ProposingWish) -> None:
@@ -392,9 +392,9 @@ class ProposingJob:
             self._answered = newest
             first = sorted(newest.confirmed, key=lambda click: (len(click.id), click.id))[:_LOOKS]
             key = tuple((click.id, click.image_time, click.u_px, click.v_px) for click in first)
-            if self._looks[0] != key:
-                self._looks = (key, looks_of(first, self._seen, self._recording, newest.camera))
-            looks = self._looks[1]
+            if self._appearances[0] != key:
+                self._appearances = (key, appearances_of(first, self._seen, self._recording, newest.camera))
+            looks = self._appearances[1]
             if not looks:
                 self._carried, self._carried_from = list(self._seen), [key] * len(self._seen)
             left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
@@ -408,7 +408,7 @@ class ProposingJob:
                 return
             number, since = left[0], since + 1
             seen = self._seen[number : number + 1]
-            self._carried[number : number + 1] = with_look(seen, looks, self._recording, newest.camera)
+            self._carried[number : number + 1] = with_appearance(seen, looks, self._recording, newest.camera)
             self._carried_from[number] = key
 
     def _in_turn(self, wish: ProposingWish) -> list[int]:

@@ -43,14 +43,14 @@ class Journal(Protocol):
         """Close the file; return whether everything is in it, also when called again."""
 
 
-class _Unstored:
-    """Stores nothing: changes of options while looking at a recording without images are not kept."""
+class NullJournal:
+    """Journal that stores nothing: changes of options while looking at a recording without images are not kept."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def append(self, step: Step, history: History) -> None:
-        """Forget the step."""
+        """Do nothing."""
 
     def close(self) -> Closed:
         """Return that there was nothing to store."""
@@ -361,7 +361,7 @@ def open_workspace(
     """
     facts = recording_facts(recording, name)
     if not facts.has_images:
-        nothing = _Unstored(session_folder)
+        nothing = NullJournal(session_folder)
         return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)
     solver = SolverWorker(recording, camera, reference.calibration if reference else None)

@@ -123,7 +123,7 @@ def _pairing(
         else:
             unpaired.append(problem)
     windows = [window_around(static, click.image_time, window_s=options.locating.window_s) for click in reachable]
-    elsewhere = () if background is None else _elsewhere(background, windows, options)
+    elsewhere = () if background is None else _background_windows(background, windows, options)
     pairs, empty = _paired(reachable, windows, static, elsewhere, options)
     shared = _windows_of_placements(reachable, windows, pairs, static, options)
     if shared is not windows:
@@ -133,7 +133,7 @@ def _pairing(
     return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
 
 
-def _elsewhere(
+def _background_windows(
     background: RadarScans, windows: Sequence[RadarScans], options: CalibrationOptions
 ) -> tuple[RadarScans, ...]:
     """Cut windows clear of the clicks from the scans of a recording."""

@@ -13,7 +13,7 @@ from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, pi
 from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
-from calib_core.estimation.beyond_the_fit import NARROW_CONDITION
+from calib_core.estimation.alternative_poses import NARROW_CONDITION
 from calib_core.estimation.covariance import PoseCovariance, symmetric_inverse
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input

@@ -20,7 +20,7 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
 
 def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
     """Name the pair without which the others, judged anew, agree on another pose."""
-    pair = fit.beyond.pivotal
+    pair = fit.alternatives.pivotal
     if pair is None:
         return []
     return [

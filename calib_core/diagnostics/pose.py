@@ -121,7 +121,7 @@ def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
 def possible_poses(fit: SolvedFit) -> list[DataWarning]:
     """Warn if the samples of the posterior lie about several separate poses."""
     here = fit.refined.camera_from_radar
-    for other in fit.beyond.possible:
+    for other in fit.alternatives.possible:
         error = other.camera_from_radar.error_from(here)
         sigmas = float(np.sqrt(error @ np.linalg.solve(fit.uncertainty.covariance, error)))
         if not on_rig(fit, other.camera_from_radar):
@@ -133,7 +133,7 @@ def possible_poses(fit: SolvedFit) -> list[DataWarning]:
 
 def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
     """Name the outliers that agree among themselves on another pose."""
-    outliers = fit.beyond.agreeing
+    outliers = fit.alternatives.agreeing
     if outliers is None:
         return []
     names = [fit.ids[i] for i in outliers.pairs]

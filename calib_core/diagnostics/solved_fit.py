@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from calib_core.arrays import Flags
+from calib_core.estimation.alternative_poses import PoseAlternatives
 from calib_core.estimation.best_fit import BestFit
-from calib_core.estimation.beyond_the_fit import BeyondTheFit
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut
@@ -28,7 +28,7 @@ class SolvedFit:
         best: the fit and the solutions of other starts, as the solver found them.
         chi2_per_degree: chi2 per degree of freedom under the assumed noise.
         options: of the calibration.
-        beyond: what the fit and its covariance do not show.
+        alternatives: what the fit and its covariance do not show.
     """
 
     ids: tuple[str, ...]
@@ -41,4 +41,4 @@ class SolvedFit:
     best: BestFit
     chi2_per_degree: float
     options: CalibrationOptions
-    beyond: BeyondTheFit
+    alternatives: PoseAlternatives

@@ -38,7 +38,7 @@ _ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
 _TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
 _COARSE_TOLERANCES = (0.02, 0.02)
 _LARGEST_RATIO = 0.95  # of successive changes of the noise scales; above it nothing is extrapolated
-_UNDONE, _SMALL_STEP, _MOST_CAUTION = 0.3, 1e-6, 1e4  # share of a step, squared standard deviations of the priors
+_UNDONE, _SMALL_STEP, _MAX_DAMPING = 0.3, 1e-6, 1e4  # share of a step, squared standard deviations of the priors
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
 _NEAR_OUTLIER_SHARE = 0.01  # of the pairs that are not outliers anywhere on the image
 _NEAR_OUTLIER_FACTOR = 5.0  # how many times noisier a near outlier is
@@ -108,10 +108,10 @@ class _State:
     """of the logarithm of the scales in the previous round"""
     step: Values = field(default_factory=lambda: np.zeros(0))
     """(k,) of the systematic errors in the previous round"""
-    caution: float = 1.0
+    damping: float = 1.0
     """factor on their priors' information in a step, which shortens it and does not move the optimum"""
 
-    def take_care(self, step: Values, prior_information: np.ndarray) -> None:
+    def adapt_damping(self, step: Values, prior_information: np.ndarray) -> None:
         """Make the next steps of the systematic errors shorter if this one undoes the previous one, longer if it repeats it.
 
         An elevation scale on flat ground is nearly a shift of the camera, so that only its prior determines it, and steps
@@ -122,7 +122,7 @@ class _State:
             length = float(self.step @ prior_information @ self.step)
             undone = -float(step @ prior_information @ self.step) / max(length, 1e-300)
             if undone < -_UNDONE or (undone > _UNDONE and length > _SMALL_STEP):
-                self.caution = min(max(self.caution * (1.0 + undone), 1.0), _MOST_CAUTION)
+                self.damping = min(max(self.damping * (1.0 + undone), 1.0), _MAX_DAMPING)
         self.step = step
 
     def rescale(self, scale: Values, *, extrapolate: bool) -> float:
@@ -179,13 +179,13 @@ def fit_errors_in_variables(
     model, _ = _expect(noisy, state, weigh=True, scaled=degrees > 0.0)
     polar = state.measured.polar if state.polar is None else state.polar
     rivals = rival_rows(noisy, state.pose, state.weights > _HALF)
-    weights = _until_chosen(state.weights, rivals >= 0)
+    weights = _downweight_ambiguous(state.weights, rivals >= 0)
     return ErrorsInVariablesFit(
         state.pose, state.rows, weights, noisy, polar, model, state.scale, degrees, state.share, rivals
     )
 
 
-def _until_chosen(weights: Values, undecided: Flags) -> Values:
+def _downweight_ambiguous(weights: Values, undecided: Flags) -> Values:
     """Halve the weights (n,) of the pairs that two returns explain alike, if these are few: of most pairs, it is no question."""
     inliers = weights > _HALF
     asked = inliers & undecided
@@ -244,14 +244,14 @@ def _maximise(measurements: PairMeasurements, state: _State, model: Linearizatio
     hessian, gradient = normal_equations(measurements, state.pose, model, state.weights)
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
     damped = hessian.copy()
-    caution = (
-        state.caution if state.polar is not None else _MOST_CAUTION
+    damping = (
+        state.damping if state.polar is not None else _MAX_DAMPING
     )  # noise would pass for a scale at measured positions
-    damped[6:, 6:] += (caution - 1.0) * measurements.errors.prior_information
+    damped[6:, 6:] += (damping - 1.0) * measurements.errors.prior_information
     step = np.linalg.solve(damped / np.outer(scale, scale) + 1e-12 * np.eye(len(scale)), gradient / scale) / scale
     longest = max(float(np.linalg.norm(step[3:6])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
     step = step / longest
-    state.take_care(step[6:], measurements.errors.prior_information)
+    state.adapt_damping(step[6:], measurements.errors.prior_information)
     state.pose = state.pose.perturbed(step[:6])
     state.errors = state.errors + step[6:]
     # mu = m' + V J^T S^-1 (e - J step), from the eliminated equations

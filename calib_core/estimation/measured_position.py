@@ -5,7 +5,7 @@ it may be off: with V0 the variance that it has where the pairs say nothing, its
 that its variance is V1 = (nu sigma^2 + |e|^2) / (nu - 2). With x the distance over the one that a right position exceeds in
 one set of thirty-three, it is believed with the probability
 
-    q = 1 / (1 + exp(_STEEPNESS (x^2 - _HALF_BELIEVED^2))).                                                (8)
+    q = 1 / (1 + exp(_STEEPNESS (x^2 - _HALF_WEIGHT^2))).                                                (8)
 
 The answer is the mean of the pose with it, with q, and the pose without it. That is the pose of a position with the variance
 V1 / q + C (1 - q) / q, and the covariance grows by q (1 - q) times the square of the difference of the two poses, which is
@@ -26,8 +26,11 @@ from calib_core.estimation.measurement_model import CameraPrior, PairMeasurement
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 
 _LEVEL = 0.03  # probability that a right position is farther from that of the pairs
-_HALF_BELIEVED, _STEEPNESS = 1.05, 6.0
-_SURELY, _LEAST_BELIEVED = 0.5, 0.01  # x below which smooth angle errors change nothing; q of a position without weight
+_HALF_WEIGHT, _STEEPNESS = 1.05, 6.0
+_CONSISTENT, _LEAST_WEIGHT = (
+    0.5,
+    0.01,
+)  # x below which smooth angle errors change nothing; q of a position without weight
 _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
@@ -79,21 +82,21 @@ def weighed_position(
     centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone, smooth=False).covariance)
     limit = _contradiction_sigmas(alone.degrees_of_freedom)
     sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
-    if sigmas > _SURELY * limit:
+    if sigmas > _CONSISTENT * limit:
         centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone).covariance)
         sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
-    believed = float(1.0 / (1.0 + np.exp(min(_STEEPNESS * ((sigmas / limit) ** 2 - _HALF_BELIEVED**2), 500.0))))
+    weight = float(1.0 / (1.0 + np.exp(min(_STEEPNESS * ((sigmas / limit) ** 2 - _HALF_WEIGHT**2), 500.0))))
     away_m = prior.position_m - centre.position_m
     variance_m2 = prior.expected_variance_m2(np.zeros(3))
     variance_m2 = prior.expected_variance_m2(variance_m2 * centre.solved(away_m, variance_m2))
     difference = centre.mixed @ centre.solved(away_m, variance_m2)
     weighed = weakened.prior
-    if believed > _LEAST_BELIEVED:
-        unbelieved_m2 = (1.0 - believed) * float(np.trace(centre.covariance_m2)) / 3.0
-        weighed = prior.weighed_with(float(np.sqrt((variance_m2 + unbelieved_m2) / believed)))
+    if weight > _LEAST_WEIGHT:
+        unbelieved_m2 = (1.0 - weight) * float(np.trace(centre.covariance_m2)) / 3.0
+        weighed = prior.weighed_with(float(np.sqrt((variance_m2 + unbelieved_m2) / weight)))
     position = WeighedPosition(
         weighed,
-        np.sqrt(believed * (1.0 - believed)) * difference,
+        np.sqrt(weight * (1.0 - weight)) * difference,
         sigmas > limit,
         float(np.linalg.norm(away_m)),
         sigmas,

@@ -77,7 +77,7 @@ def judged_by_boxes(
         targets=counted.found_targets,
         matched_targets=counted.matched_targets,
         returns=BoxedReturns(
-            np.searchsorted(_told(counted), counted.frames),
+            np.searchsorted(_frames_in_view(counted), counted.frames),
             counted.points_radar_m,
             pixels_px,
             counted.boxes_px,
@@ -207,11 +207,11 @@ def _frames(counted: CountedReturns, inside: Flags) -> tuple[FrameFigure, ...]:
             boxes=int(counted.box_counts[i]),
             range_m=float(np.median(range_m[ends[i] : ends[i + 1]])) if returns[i] else float("nan"),
         )
-        for i in _told(counted).tolist()
+        for i in _frames_in_view(counted).tolist()
     )
 
 
-def _told(counted: CountedReturns) -> Indices:
+def _frames_in_view(counted: CountedReturns) -> Indices:
     """Return the frames that have returns or boxes; the others are left out of the figures."""
     returns = np.bincount(counted.frames, minlength=len(counted.image_times))
     return np.flatnonzero((returns > 0) | (counted.box_counts > 0))

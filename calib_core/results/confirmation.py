@@ -3,7 +3,7 @@
 from calib_core.results import DataWarning, UnconfirmedClicks
 
 
-def nobody_confirmed(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
+def unconfirmed_warning(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
     """Warn that clicks were placed automatically.
 
     Args:

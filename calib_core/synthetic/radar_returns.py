@@ -16,7 +16,7 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic.options import RadarDefects, RadarName, SimulationOptions
-from calib_core.synthetic.timeline import Islands, SensorTimes, draw_times
+from calib_core.synthetic.timeline import RecordedSegments, SensorTimes, draw_times
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ def antennas_of(
     rngs: tuple[np.random.Generator, np.random.Generator],
     *,
     duration_s: float,
-    islands: Islands,
+    segments: RecordedSegments,
 ) -> tuple[Antenna, ...]:
     """Return the antennas with their times; of two the far one first.
 
@@ -173,12 +173,12 @@ def antennas_of(
         profile: of the radar.
         rngs: the only source of randomness of the first and the second antenna.
         duration_s: of the story.
-        islands: what of it is recorded.
+        segments: what of it is recorded.
     """
 
     def times(rng: np.random.Generator, rate_hz: float, first_s: float | None = None) -> SensorTimes:
         return draw_times(
-            rng, duration_s, rate_hz, latency_s=profile.latency_s, transfer_s=0.003, islands=islands, first_s=first_s
+            rng, duration_s, rate_hz, latency_s=profile.latency_s, transfer_s=0.003, segments=segments, first_s=first_s
         )
 
     if not options.defects.near_and_far:

@@ -39,7 +39,7 @@ class SensorTimes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Islands:
+class RecordedSegments:
     """The parts of the story that are recorded, and how much later than in the story each is.
 
     Attributes:
@@ -76,7 +76,7 @@ class Islands:
         return min(time_s, float(self.ends_s[island])) + float(self.delays_s[island])
 
 
-def draw_islands(rng: np.random.Generator, middles_s: Values) -> Islands:
+def draw_segments(rng: np.random.Generator, middles_s: Values) -> RecordedSegments:
     """Draw an island around each middle: 2 to 15 s, but not beyond half way to the next, and gaps of minutes between.
 
     Args:
@@ -89,10 +89,10 @@ def draw_islands(rng: np.random.Generator, middles_s: Values) -> Islands:
     ends_s = np.minimum(middles_s + half_s, np.concatenate([between_s, [np.inf]]))
     gaps_s = np.concatenate([[0.0], rng.uniform(*_GAP_S, len(between_s))])
     passed_s = np.concatenate([[0.0], starts_s[1:] - ends_s[:-1]])
-    return Islands(starts_s, ends_s, np.cumsum(gaps_s - passed_s) - starts_s[0])
+    return RecordedSegments(starts_s, ends_s, np.cumsum(gaps_s - passed_s) - starts_s[0])
 
 
-EVERYTHING = Islands(np.zeros(1), np.full(1, np.inf), np.zeros(1))
+EVERYTHING = RecordedSegments(np.zeros(1), np.full(1, np.inf), np.zeros(1))
 """The whole story, as it was."""
 
 
@@ -103,7 +103,7 @@ def draw_times(
     *,
     latency_s: float,
     transfer_s: float,
-    islands: Islands = EVERYTHING,
+    segments: RecordedSegments = EVERYTHING,
     first_s: float | None = None,
 ) -> SensorTimes:
     """Draw one sensor's times.
@@ -114,15 +114,15 @@ def draw_times(
         rate_hz: measurements per second.
         latency_s: from the measurement to its stamp [s].
         transfer_s: mean delay from the stamp to the recorder [s].
-        islands: what of the story is recorded.
+        segments: what of the story is recorded.
         first_s: time of the first measurement [s]; None draws it.
     """
     drawn_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)
     moments = np.arange(drawn_s if first_s is None else first_s, duration_s, 1.0 / rate_hz)
     jitter = np.clip(_JITTER_S * rng.standard_normal(len(moments)), -0.3 / rate_hz, 0.3 / rate_hz)
     moments = (moments + jitter)[rng.uniform(size=len(moments)) >= _DROPPED_SHARE]
-    moments = moments[islands.recorded(moments)]
-    header = START_NS + np.round((moments + islands.delay_s(moments) + latency_s) * NS_PER_S).astype(np.int64)
+    moments = moments[segments.recorded(moments)]
+    header = START_NS + np.round((moments + segments.delay_s(moments) + latency_s) * NS_PER_S).astype(np.int64)
     delay_s = transfer_s * rng.gamma(4.0, 0.25, len(moments))
     receive = np.maximum.accumulate(header + np.round(delay_s * NS_PER_S).astype(np.int64))
     return SensorTimes(moments, header, receive + np.arange(len(moments)))

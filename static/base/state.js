@@ -14,7 +14,7 @@ export const state = {
   placementsKnown: false,
   /** @type {import("../messages.js").Overlay|null} */ overlay: null,
   /** Whether the recording has no images: it can be looked at from above, but not clicked in. */ looking: false,
-  /** The returns of the last seconds. @type {import("../messages.js").RadarLook|null} */ look: null,
+  /** The returns of the last seconds. @type {import("../messages.js").RadarFrame|null} */ look: null,
   /** @type {import("../messages.js").RadarMap|null} */ radarMap: null,
   /** What is shown without images. @type {{trail_s: number, colour: "speed"|"amplitude", map: boolean, whole: boolean}} */
   lookOptions: { trail_s: 2, colour: "amplitude", map: true, whole: true },

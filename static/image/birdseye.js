@@ -20,17 +20,17 @@ const RING = 13;
 /** Angles are written below the line of text at the top [CSS px]. */
 const LABELS_BELOW = 92;
 /** Metres at the middle of the canvas, forward and left, and CSS px per metre. */
-const eye = { x: 5, y: 0, scale: 30, fitted: true };
+const view = { x: 5, y: 0, scale: 30, fitted: true };
 let waiting = false;
 /** @type {{x: number, y: number, moved: boolean}|null} */
 let press = null;
 
 function startBirdseye() {
-  attemptFirst("fit", () => state.looking && fitEye());
+  attemptFirst("fit", () => state.looking && fitView());
   attemptFirst("zoom-in", () => state.looking && zoomEye(1.25));
   attemptFirst("zoom-out", () => state.looking && zoomEye(0.8));
-  new ResizeObserver(() => (eye.fitted ? fitEye() : redraw())).observe(canvas);
-  on(["radar_map", "placements", "recording"], () => eye.fitted && fitEye());
+  new ResizeObserver(() => (view.fitted ? fitView() : redraw())).observe(canvas);
+  on(["radar_map", "placements", "recording"], () => view.fitted && fitView());
   on(["look", "cursor", "theme", "layers"], redraw);
   canvas.addEventListener("pointerdown", (event) => {
     press = { x: event.offsetX, y: event.offsetY, moved: false };
@@ -39,12 +39,12 @@ function startBirdseye() {
   canvas.addEventListener("pointermove", moved);
   canvas.addEventListener("pointerup", released);
   canvas.addEventListener("pointerleave", hideTip);
-  canvas.addEventListener("dblclick", fitEye);
+  canvas.addEventListener("dblclick", fitView);
   canvas.addEventListener("wheel", wheeled, { passive: false });
 }
 
 /** Show everything. @returns {true} it is done */
-function fitEye() {
+function fitView() {
   const { x_m: forward, y_m: left } = state.radarMap ?? { x_m: [], y_m: [] };
   const places = state.placements.map((placement) => placement.position_radar_m);
   const xs = [...forward, ...places.map(([x]) => x)].sort((a, b) => a - b);
@@ -52,8 +52,8 @@ function fitEye() {
   const at = (/** @type {number[]} */ sorted, /** @type {number} */ share, /** @type {number} */ otherwise) => sorted[Math.round(share * (sorted.length - 1))] ?? otherwise;
   const [back, front] = [Math.min(-0.5, at(xs, 0.01, 0)), Math.max(2, at(xs, 0.99, 10), ...places.map(([x]) => x))];
   const side = Math.max(2, at(ys, 0.99, 5), -at(ys, 0.01, -5), ...places.map(([, y]) => Math.abs(y)));
-  eye.scale = Math.max(1, Math.min((canvas.clientHeight - 70) / (front - back), (canvas.clientWidth - 60) / (2 * side)));
-  [eye.x, eye.y, eye.fitted] = [(front + back) / 2, 0, true];
+  view.scale = Math.max(1, Math.min((canvas.clientHeight - 70) / (front - back), (canvas.clientWidth - 60) / (2 * side)));
+  [view.x, view.y, view.fitted] = [(front + back) / 2, 0, true];
   redraw();
   return true;
 }
@@ -61,19 +61,19 @@ function fitEye() {
 /** @param {number} factor @param {number} [x] @param {number} [y] CSS px @returns {true} it is done */
 function zoomEye(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
   const [forward, left] = toRadar(x, y);
-  eye.scale = Math.min(2000, Math.max(1, eye.scale * factor));
-  eye.fitted = false;
+  view.scale = Math.min(2000, Math.max(1, view.scale * factor));
+  view.fitted = false;
   const [nowForward, nowLeft] = toRadar(x, y);
-  [eye.x, eye.y] = [eye.x + forward - nowForward, eye.y + left - nowLeft];
+  [view.x, view.y] = [view.x + forward - nowForward, view.y + left - nowLeft];
   redraw();
   return true;
 }
 
 /** Metres to CSS px. @param {number} x @param {number} y @returns {[number, number]} */
-export const toCanvas = (x, y) => [canvas.clientWidth / 2 - (y - eye.y) * eye.scale, canvas.clientHeight / 2 - (x - eye.x) * eye.scale];
+export const toCanvas = (x, y) => [canvas.clientWidth / 2 - (y - view.y) * view.scale, canvas.clientHeight / 2 - (x - view.x) * view.scale];
 
 /** @param {number} x @param {number} y CSS px @returns {[number, number]} */
-const toRadar = (x, y) => [eye.x - (y - canvas.clientHeight / 2) / eye.scale, eye.y - (x - canvas.clientWidth / 2) / eye.scale];
+const toRadar = (x, y) => [view.x - (y - canvas.clientHeight / 2) / view.scale, view.y - (x - canvas.clientWidth / 2) / view.scale];
 
 function redraw() {
   if (waiting || !state.looking) return;
@@ -96,7 +96,7 @@ function redraw() {
 function drawMap() {
   const map = state.radarMap;
   if (!map) return;
-  const size = Math.max(2, map.cell_m * eye.scale);
+  const size = Math.max(2, map.cell_m * view.scale);
   const byAmplitude = state.lookOptions.colour === "amplitude" && map.snr_db.length > 0;
   map.x_m.forEach((x, index) => {
     const [px, py] = toCanvas(x, map.y_m[index]);
@@ -108,7 +108,7 @@ function drawMap() {
 }
 
 function drawGrid() {
-  const rough = 75 / eye.scale;
+  const rough = 75 / view.scale;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough) ?? rough;
   const farthest = Math.max(...[[0, 0], [canvas.clientWidth, 0], [0, canvas.clientHeight], [canvas.clientWidth, canvas.clientHeight]].map(([x, y]) => Math.hypot(...toRadar(x, y))));
@@ -119,15 +119,15 @@ function drawGrid() {
   pen.lineWidth = 1;
   for (let range = step; range < farthest && range < 60 * step; range += step) {
     pen.beginPath();
-    pen.arc(ox, oy, range * eye.scale, 0, 2 * Math.PI);
+    pen.arc(ox, oy, range * view.scale, 0, 2 * Math.PI);
     pen.stroke();
-    text(`${Number(range.toPrecision(3))} m`, ox + 5, oy - range * eye.scale - 5, "left");
+    text(`${Number(range.toPrecision(3))} m`, ox + 5, oy - range * view.scale - 5, "left");
   }
   for (let angle = -60; angle <= 60; angle += 15) {
     const [dx, dy] = [-Math.sin((angle * Math.PI) / 180), -Math.cos((angle * Math.PI) / 180)];
     pen.beginPath();
     pen.moveTo(ox, oy);
-    pen.lineTo(ox + dx * farthest * eye.scale, oy + dy * farthest * eye.scale);
+    pen.lineTo(ox + dx * farthest * view.scale, oy + dy * farthest * view.scale);
     pen.stroke();
     const far = Math.min(dy < 0 ? (oy - LABELS_BELOW) / -dy : Infinity, dx < 0 ? (ox - 26) / -dx : dx > 0 ? (canvas.clientWidth - 26 - ox) / dx : Infinity);
     if (angle && far > 90) text(`${Math.abs(angle)}° ${angle > 0 ? "L" : "R"}`, ox + dx * far, oy + dy * far, "center");
@@ -195,7 +195,7 @@ function moved(event) {
   if (!press) return explain(event);
   const [dx, dy] = [event.offsetX - press.x, event.offsetY - press.y];
   if (!press.moved && Math.hypot(dx, dy) < 4) return;
-  [eye.x, eye.y, eye.fitted] = [eye.x + dy / eye.scale, eye.y + dx / eye.scale, false];
+  [view.x, view.y, view.fitted] = [view.x + dy / view.scale, view.y + dx / view.scale, false];
   press = { x: event.offsetX, y: event.offsetY, moved: true };
   hideTip();
   redraw();

@@ -12,7 +12,7 @@ const { viewport } = geometry;
 const pane = /** @type {HTMLElement} */ (document.getElementById("image-pane"));
 const image = /** @type {HTMLCanvasElement} */ (document.getElementById("image"));
 export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
-const paper = /** @type {CanvasRenderingContext2D} */ (image.getContext("2d", { alpha: false }));
+const context = /** @type {CanvasRenderingContext2D} */ (image.getContext("2d", { alpha: false }));
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
 /** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
 const SQUARES_FROM = 8;
@@ -112,14 +112,14 @@ function paint() {
 }
 
 function paintImage() {
-  paper.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
-  paper.fillRect(0, 0, image.width, image.height);
+  context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
+  context.fillRect(0, 0, image.width, image.height);
   const shown = state.shown ?? state.preview;
   if (!shown) return;
-  paper.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
-  paper.imageSmoothingQuality = state.playing ? "low" : "high";
+  context.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
+  context.imageSmoothingQuality = state.playing ? "low" : "high";
   const [x, y] = geometry.toDevice(-0.5, -0.5);
-  paper.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);
+  context.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);
 }
 
 /** Fit the image into its box. */

@@ -10,7 +10,7 @@ import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../b
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
 import { toggleRectified, withoutRectified } from "./rectified.js";
 
-/** @typedef {CanvasRenderingContext2D} Ink */
+/** @typedef {CanvasRenderingContext2D} Context2D */
 /** @typedef {import("../messages.js").ClickRow} Click */
 
 /** Within this distance of a mark, the pointer counts as being at the reflector [CSS px]. */
@@ -23,7 +23,7 @@ const CLOSE_ZOOM = 2;
 /** What the server says of the frame on screen, once it is known. */
 const overlayHere = () => (state.overlay?.index === state.shown?.index ? state.overlay : null);
 
-/** The returns, what is predicted and the clicks of the frame on screen. @param {Ink} pen */
+/** The returns, what is predicted and the clicks of the frame on screen. @param {Context2D} pen */
 function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = overlayHere();
@@ -38,7 +38,7 @@ function drawMarks(pen) {
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */
 const isOpen = (index, range) => placementsAt(index).some((one) => Math.abs(one.range_m - range) < 0.01 && isOffered(one));
 
-/** @param {Ink} pen @param {import("../messages.js").RadarReturn[]} returns */
+/** @param {Context2D} pen @param {import("../messages.js").RadarReturn[]} returns */
 function drawReturns(pen, returns) {
   const size = 3.2 * viewport.unit;
   for (const [u, v, , , , isStill] of returns) {
@@ -56,7 +56,7 @@ function drawReturns(pen, returns) {
   }
 }
 
-/** @param {Ink} pen @param {number} x @param {number} y @param {number} size */
+/** @param {Context2D} pen @param {number} x @param {number} y @param {number} size */
 function triangle(pen, x, y, size) {
   pen.moveTo(x, y - size);
   pen.lineTo(x + size * 0.9, y + size * 0.7);
@@ -64,14 +64,14 @@ function triangle(pen, x, y, size) {
   pen.closePath();
 }
 
-/** Where the radar and the pose expect the reflector. @param {Ink} pen @param {number} u @param {number} v */
+/** Where the radar and the pose expect the reflector. @param {Context2D} pen @param {number} u @param {number} v */
 function drawGuess(pen, u, v) {
   const [x, y] = toDevice(u, v);
   const dashes = [4 * viewport.unit, 3.5 * viewport.unit];
   outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.unit, 0, 2 * Math.PI), dashes);
 }
 
-/** The best next placement: a dashed diamond, since it lies on the ground. @param {Ink} pen @param {import("../messages.js").Advice} advice */
+/** The best next placement: a dashed diamond, since it lies on the ground. @param {Context2D} pen @param {import("../messages.js").Advice} advice */
 function drawAdvice(pen, advice) {
   if (advice.best.may_stop) return;
   const [x, y] = toDevice(advice.best.pixel_px[0], advice.best.pixel_px[1]);
@@ -95,7 +95,7 @@ function drawAdvice(pen, advice) {
   pen.fillText(words, x, at);
 }
 
-/** A click of another frame, small and dimmed. @param {Ink} pen @param {Click} click */
+/** A click of another frame, small and dimmed. @param {Context2D} pen @param {Click} click */
 function drawOther(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
   const arm = 4 * viewport.unit;
@@ -105,7 +105,7 @@ function drawOther(pen, click) {
   pen.globalAlpha = 1;
 }
 
-/** The click of this frame with its reprojection, residual and ellipse. @param {Ink} pen @param {Click} click */
+/** The click of this frame with its reprojection, residual and ellipse. @param {Context2D} pen @param {Click} click */
 function drawClick(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
   const closeUp = looksClosely(click);
@@ -131,7 +131,7 @@ function looksClosely(click) {
   return Math.hypot(x - cx, y - cy) < CLOSE;
 }
 
-/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y @param {boolean} closeUp */
+/** @param {Context2D} pen @param {Click} click @param {number} x @param {number} y @param {boolean} closeUp */
 function drawReprojection(pen, click, x, y, closeUp) {
   const ring = /** @type {[number, number]} */ (click.projected_px);
   const [px, py] = toDevice(ring[0], ring[1]);
@@ -162,7 +162,7 @@ function drawReprojection(pen, click, x, y, closeUp) {
 
 /**
  * Stroke a path with a dark edge below it, so that it is visible on any image.
- * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
+ * @param {Context2D} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
  */
 export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash(dashes);
@@ -177,7 +177,7 @@ export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash([]);
 }
 
-/** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
+/** @param {Context2D} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
 export function cross(pen, x, y, arm, gap) {
   for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
     pen.moveTo(x + dx * gap, y + dy * gap);
@@ -185,7 +185,7 @@ export function cross(pen, x, y, arm, gap) {
   }
 }
 
-/** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
+/** @param {Context2D} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
 function hollowCross(pen, x, y, arm, gap) {
   const half = 2 * viewport.unit;
   for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {

@@ -189,20 +189,20 @@ function drawLensMarks(pen) {
   }
 }
 
-/** @typedef {CanvasRenderingContext2D} Ink */
+/** @typedef {CanvasRenderingContext2D} Context2D */
 /** From this many corners on, a cell of the map is full. */
 const FULL = 20;
 /** The length of a typical arrow, as a part of the plot's width. */
 const ARROW = 0.03;
 
-/** Make a canvas as large as it is shown, with the image's shape. @param {HTMLCanvasElement} canvas @param {number} wide @param {number} high of the image @returns {Ink|null} */
-function paper(canvas, wide, high) {
+/** Make a canvas as large as it is shown, with the image's shape. @param {HTMLCanvasElement} canvas @param {number} wide @param {number} high of the image @returns {Context2D|null} */
+function sizedContext(canvas, wide, high) {
   const width = canvas.clientWidth;
   if (!width || !wide) return null;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(((width * high) / wide) * ratio);
-  const pen = /** @type {Ink} */ (canvas.getContext("2d"));
+  const pen = /** @type {Context2D} */ (canvas.getContext("2d"));
   pen.fillStyle = themeColour("ground");
   pen.fillRect(0, 0, canvas.width, canvas.height);
   return pen;
@@ -213,7 +213,7 @@ const eachCell = (grid, draw) => grid.forEach((values, row) => values.forEach((v
 
 /** How many corners were in each part of the image. @param {HTMLCanvasElement} canvas @param {import("../messages.js").Coverage} coverage @param {number} wide @param {number} high */
 export function drawCoverage(canvas, coverage, wide, high) {
-  const pen = paper(canvas, wide, high);
+  const pen = sizedContext(canvas, wide, high);
   if (!pen) return;
   const { counts } = coverage;
   const [width, height] = [canvas.width / counts[0].length, canvas.height / counts.length];
@@ -229,7 +229,7 @@ export function drawCoverage(canvas, coverage, wide, high) {
   });
 }
 
-/** The same over the frame: only what is still empty is veiled. @param {Ink} pen @param {import("../messages.js").Coverage} coverage @param {(u: number, v: number) => [number, number]} toDevice @param {number} wide @param {number} high */
+/** The same over the frame: only what is still empty is veiled. @param {Context2D} pen @param {import("../messages.js").Coverage} coverage @param {(u: number, v: number) => [number, number]} toDevice @param {number} wide @param {number} high */
 function veilEmpty(pen, coverage, toDevice, wide, high) {
   const { counts } = coverage;
   const [du, dv] = [wide / counts[0].length, high / counts.length];
@@ -243,7 +243,7 @@ function veilEmpty(pen, coverage, toDevice, wide, high) {
 
 /** Arrows from where corners were found to where the camera puts them, enlarged. @param {HTMLCanvasElement} canvas @param {import("../messages.js").LensResult["residuals"]} residuals @param {number} wide @param {number} high @returns {number} how many times they are enlarged */
 function drawResiduals(canvas, residuals, wide, high) {
-  const pen = paper(canvas, wide, high);
+  const pen = sizedContext(canvas, wide, high);
   if (!pen || !residuals.length) return 0;
   const lengths = residuals.map(([, , du, dv]) => Math.hypot(du, dv)).sort((a, b) => a - b);
   const typical = lengths[Math.floor(0.75 * lengths.length)] || 1;
@@ -273,7 +273,7 @@ function drawUncertainty(canvas, grid, wide, high) {
   const { sigma_px } = grid;
   const known = sigma_px.flat().filter((value) => value !== null && Number.isFinite(value));
   const [low, most] = [Math.min(...known), Math.max(...known)];
-  const pen = paper(canvas, wide, high);
+  const pen = sizedContext(canvas, wide, high);
   if (!pen || !known.length) return [low, most];
   const [width, height] = [canvas.width / sigma_px[0].length, canvas.height / sigma_px.length];
   eachCell(sigma_px, (value, column, row) => {

@@ -9,7 +9,7 @@ import { clicks, nameOf, on, state } from "../base/state.js";
 import { spaceOptions } from "./options.js";
 import { drawAgain, hookInto, projection, shownThere } from "./viser_hook.js";
 
-/** @typedef {import("../messages.js").SpaceLook} Look */
+/** @typedef {import("../messages.js").SpaceFrame} SpaceFrame */
 const pane = /** @type {HTMLElement} */ (document.getElementById("space"));
 export const layer = document.createElement("canvas");
 const pen = /** @type {CanvasRenderingContext2D} */ (layer.getContext("2d"));
@@ -17,11 +17,11 @@ const [RING, DOT] = [8, 3.8];
 /** Where words about a point stand, the preferred place first [CSS px]. */
 const BESIDE = [[0, -16], [0, 18], [-70, 0], [70, 0]];
 const labelHigh = () => smallPx() + 4;
-/** So many looks are kept until the 3D view has drawn them. */
-const MOST_LOOKS = 8;
+/** So many frames are kept until the 3D view has drawn them. */
+const MOST_FRAMES = 8;
 
-/** Newest last. @type {Look[]} */
-let looks = [];
+/** Newest last. @type {SpaceFrame[]} */
+let frames = [];
 /** @type {Item[]|null} */
 let items = null;
 /** Keys of the item under the pointer, and of the one that was picked. */
@@ -45,16 +45,16 @@ async function hookUp(frame) {
   redraw();
 }
 
-/** Take what the 3D view is about to show. @param {Look} look */
-export function takeLook(look) {
-  looks = [...looks, look].slice(-MOST_LOOKS);
+/** Take what the 3D view is about to show. @param {SpaceFrame} look */
+export function takeFrame(look) {
+  frames = [...frames, look].slice(-MOST_FRAMES);
   redraw();
 }
 
-/** What the 3D view shows now: what it has drawn, not what was sent last. @returns {Look|null} */
-export function lookShown() {
+/** What the 3D view shows now: what it has drawn, not what was sent last. @returns {SpaceFrame|null} */
+export function spaceFrame() {
   const there = shownThere();
-  return looks.find((look) => look.number === there?.number) ?? looks.at(-1) ?? null;
+  return frames.find((look) => look.number === there?.number) ?? frames.at(-1) ?? null;
 }
 
 /** Index of the frame at which the view stands; null before the first. @returns {number|null} */
@@ -98,7 +98,7 @@ const placeReturn = (place, [u, v, , , , , x, y, z]) => place([x, y, z], [u, v])
 
 /** Everything that can be picked, where it is in the view now. @returns {Item[]} */
 export function pickable() {
-  const look = lookShown();
+  const look = spaceFrame();
   const place = placing();
   if (items || !look || !place || isLate(look)) return items ?? [];
   const made = /** @type {Item[]} */ ([]);
@@ -124,7 +124,7 @@ function describeCandidate({ words, snr_db: snr, probability, used, chosen }) {
   return `Candidate: ${words}${snr === null ? "" : `, SNR ${snr.toFixed(0)} dB`}${fits}, ${chosen ? "chosen" : used ? "in use" : "click to choose it"}`;
 }
 
-/** While playing, the Camera view is ahead of the returns that were sent. @param {Look} look */
+/** While playing, the Camera view is ahead of the returns that were sent. @param {SpaceFrame} look */
 const isLate = (look) => spaceOptions.camera && look.index !== state.shown?.index;
 
 /** @param {string} id */
@@ -154,7 +154,7 @@ function draw() {
   if (layer.width !== Math.round(width * ratio) || layer.height !== Math.round(height * ratio)) [layer.width, layer.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
-  const look = lookShown();
+  const look = spaceFrame();
   if (spaceOptions.camera) paintFrame(look);
   const place = placing();
   if (look && place && !isLate(look)) drawLook(look, place, new Board(width, height));
@@ -165,7 +165,7 @@ function draw() {
   told();
 }
 
-/** @param {Look} look @param {NonNullable<ReturnType<typeof placing>>} place @param {Board} board */
+/** @param {SpaceFrame} look @param {NonNullable<ReturnType<typeof placing>>} place @param {Board} board */
 function drawLook(look, place, board) {
   if (spaceOptions.camera) drawReturns(look, place);
   for (const row of candidates()) {
@@ -195,7 +195,7 @@ function drawLook(look, place, board) {
   for (const { range, x, y } of ringPlaces(look.rings_m, look.ground_m, project, board, size)) write(words(range), x, y, "muted");
 }
 
-/** The page's own image, as large as it fits. @param {Look|null} look */
+/** The page's own image, as large as it fits. @param {SpaceFrame|null} look */
 function paintFrame(look) {
   pen.fillStyle = themeColour("ground");
   pen.fillRect(0, 0, layer.clientWidth, layer.clientHeight);
@@ -207,7 +207,7 @@ function paintFrame(look) {
   for (const [u, v, , , , isStill] of state.overlay.returns ?? []) dot(box.left + (u + 0.5) * box.scale, box.top + (v + 0.5) * box.scale, DOT, isStill ? ink.still : ink.moving, isStill);
 }
 
-/** @param {Look} look @param {NonNullable<ReturnType<typeof placing>>} place */
+/** @param {SpaceFrame} look @param {NonNullable<ReturnType<typeof placing>>} place */
 function drawReturns(look, place) {
   for (const [[u, v, , , , isStill], colour, size] of look.returns) {
     const at = place([], [u, v]);

@@ -7,7 +7,7 @@ import { clicks, on, select, state } from "../base/state.js";
 import { comeTo } from "../image/arriving.js";
 import { choose } from "../image/candidates.js";
 import { addToCursor, tellCursor } from "../time/player.js";
-import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, imageBox, redraw, startLayer, takeLook } from "./layer.js";
+import { candidates, frameShown, itemAt, layer, spaceFrame, mark, onDrawn, pickable, pickedWords, imageBox, redraw, startLayer, takeFrame } from "./layer.js";
 import { changeSpace, cursorOptions, spaceColour, spaceOptions } from "./options.js";
 
 /** @typedef {import("./options.js").Colour} Colour */
@@ -63,7 +63,7 @@ export function startSpace(listen) {
     { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: toggleHidden, ...SPACE },
     { id: "space-large", words: "Enlarge the 3D view, or give the image its place back", keys: ["B"], also: "3D big maximize full", run: toggleLarge, ...SPACE },
   );
-  Object.assign(window, { cocalibPace: pace, __cocalibSpace: { lookShown, pickable, imageBox, frameShown, itemAt } });
+  Object.assign(window, { cocalibPace: pace, __cocalibSpace: { spaceFrame, pickable, imageBox, frameShown, itemAt } });
   on(["playing"], () => Object.assign(pace, { playing: state.playing, every: state.looking ? LOOKING_EVERY : PLAYING_EVERY }));
   for (const type of ["pointerdown", "pointerup", "keydown", "wheel"])
     addEventListener(type, () => (pace.holdUntil = performance.now() + HOLD), { capture: true, passive: true });
@@ -91,8 +91,8 @@ function load() {
   if (!frame.hasAttribute("src")) frame.src = `viser/${tab}/`;
 }
 
-/** Take what the server says about the 3D view. @param {import("../messages.js").SpaceLook} look */
-export const takeSpace = (look) => takeLook(look);
+/** Take what the server says about the 3D view. @param {import("../messages.js").SpaceFrame} look */
+export const takeSpace = (look) => takeFrame(look);
 
 function startChips() {
   for (const [viewpoint, label, hint] of VIEWPOINTS) {
@@ -174,7 +174,7 @@ function arrange() {
 
 /** What the colours mean. */
 function drawBar() {
-  const known = lookShown()?.legend;
+  const known = spaceFrame()?.legend;
   if (!known) return;
   const parts = known.ramp
     ? [known.low, make("i", "ramp", []), known.high]
@@ -193,7 +193,7 @@ function drawStanding() {
 
 /** Words about what is under the pointer, else about what was picked. @param {import("./layer.js").Item|null} item */
 function drawReadout(item) {
-  const unplaced = spaceOptions.camera && lookShown()?.projected === false;
+  const unplaced = spaceOptions.camera && spaceFrame()?.projected === false;
   const words = item?.words ?? (hovered?.words || pickedWords() || (unplaced ? NO_POSE : ""));
   if (readout.textContent !== words) readout.textContent = words;
 }
@@ -233,7 +233,7 @@ function released(event) {
 /** Go where an item leads; a return is only marked. @param {import("./layer.js").Item} item */
 function pick(item) {
   drawReadout(item);
-  const look = lookShown();
+  const look = spaceFrame();
   if (item.kind === "placement" && state.placements[item.index]) comeTo(state.placements[item.index].frame);
   const candidate = item.kind === "candidate" ? candidates()[item.index] : undefined;
   if (candidate && !candidate.chosen) choose(item.index);

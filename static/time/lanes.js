@@ -21,7 +21,7 @@ const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", imag
 /** A timeline of this height has a higher lane for the image [CSS px]. */
 const LARGE = 140;
 
-/** @typedef {CanvasRenderingContext2D} Ink */
+/** @typedef {CanvasRenderingContext2D} Context2D */
 /** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./ruler.js").Folding}} Axis */
 
 /** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
@@ -43,7 +43,7 @@ export function laneBoxes(height) {
 
 /**
  * Draw everything.
- * @param {Ink} pen @param {number} width @param {number} height CSS px @param {Axis} axis @param {number|null} pointer
+ * @param {Context2D} pen @param {number} width @param {number} height CSS px @param {Axis} axis @param {number|null} pointer
  */
 export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
@@ -72,7 +72,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   drawNames(pen, boxes);
 }
 
-/** @param {Ink} pen @param {Boxes} boxes */
+/** @param {Context2D} pen @param {Boxes} boxes */
 function drawNames(pen, boxes) {
   pen.font = smallFont();
   pen.textAlign = "left";
@@ -90,7 +90,7 @@ export const fateOf = (placement) => (isLookedAt(placement) ? "clicked" : isDism
 /**
  * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.
  * With a proposal: a bar at the lower edge, the longer the surer it is.
- * @param {Ink} pen @param {import("../messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
+ * @param {Context2D} pen @param {import("../messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
  */
 function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
@@ -123,7 +123,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
 }
 
-/** @param {Ink} pen @param {number} left @param {number} right @param {number} y */
+/** @param {Context2D} pen @param {number} left @param {number} right @param {number} y */
 function drawDismissed(pen, left, right, y) {
   const [middle, arm] = [(left + right) / 2, 3.5];
   pen.beginPath();
@@ -136,7 +136,7 @@ function drawDismissed(pen, left, right, y) {
   pen.stroke();
 }
 
-/** @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+/** @param {Context2D} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
 function drawRadar(pen, { top, bottom }, axis) {
   if (bottom === top) return;
   const most = Math.max(1, activity.returns.reduce((a, b) => Math.max(a, b), 0));
@@ -151,7 +151,7 @@ function drawRadar(pen, { top, bottom }, axis) {
   pen.globalAlpha = 1;
 }
 
-/** How much the image changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+/** How much the image changes: low where it stands still. @param {Context2D} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
 function paintFrame(pen, { top, bottom }, axis) {
   if (bottom === top) return;
   pen.fillStyle = themeColour("attention");
@@ -185,7 +185,7 @@ function columns(axis, count, time, value) {
 /** @param {Axis} axis @param {number} step_s */
 const barWidth = (axis, step_s) => Math.ceil(pixelsPerSecond(axis) * step_s) - (pixelsPerSecond(axis) * step_s > 3 ? 0.5 : 0);
 
-/** @param {Ink} pen @param {import("../messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
+/** @param {Context2D} pen @param {import("../messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
 function drawStem(pen, click, x, { top, bottom }) {
   const limit = state.view?.residual_limit_px ?? 20;
   const size = Math.min(smallPx() / 3, (bottom - top) / 3);
@@ -210,7 +210,7 @@ function drawStem(pen, click, x, { top, bottom }) {
   } else pen.fill();
 }
 
-/** Inlier = disc, outlier = diamond. @param {Ink} pen @param {string} clickState @param {number} x @param {number} y @param {number} size */
+/** Inlier = disc, outlier = diamond. @param {Context2D} pen @param {string} clickState @param {number} x @param {number} y @param {number} size */
 function head(pen, clickState, x, y, size) {
   if (clickState !== "outlier") return pen.arc(x, y, size, 0, 2 * Math.PI);
   const reach = size * 1.35;
@@ -221,7 +221,7 @@ function head(pen, clickState, x, y, size) {
   pen.closePath();
 }
 
-/** @param {Ink} pen @param {number} height @param {number} x */
+/** @param {Context2D} pen @param {number} height @param {number} x */
 function drawCursor(pen, height, x) {
   pen.fillStyle = themeColour("ink");
   pen.fillRect(Math.round(x), RULER, 1, height);

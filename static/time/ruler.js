@@ -5,13 +5,13 @@
 
 import { smallFont, smallPx, themeColour } from "../base/colours.js";
 
-/** @typedef {CanvasRenderingContext2D} Ink */
+/** @typedef {CanvasRenderingContext2D} Context2D */
 /** @typedef {import("./lanes.js").Axis} Axis */
 
 /** Height of the ruler [CSS px]. */
 export const RULER = 17;
 
-/** Ticks and times; each stretch after a folded gap begins with its own time. @param {Ink} pen @param {number} left @param {number} width @param {number} height @param {Axis} axis */
+/** Ticks and times; each stretch after a folded gap begins with its own time. @param {Context2D} pen @param {number} left @param {number} width @param {number} height @param {Axis} axis */
 export function drawRuler(pen, left, width, height, axis) {
   pen.font = smallFont();
   pen.textBaseline = "middle";
@@ -63,7 +63,7 @@ function timeWords(seconds, step, long) {
   return step < 1 ? seconds.toFixed(Math.ceil(-Math.log10(step))) : String(Math.round(seconds));
 }
 
-/** A folded gap: hatched, with its length, upright where there is no room. @param {Ink} pen @param {number} height @param {Axis} axis */
+/** A folded gap: hatched, with its length, upright where there is no room. @param {Context2D} pen @param {number} height @param {Axis} axis */
 export function drawGaps(pen, height, axis) {
   for (const { from, to } of gapsOf(axis.folding)) {
     if (to < axis.from_s || from > axis.to_s) continue;
@@ -88,7 +88,7 @@ export function drawGaps(pen, height, axis) {
   }
 }
 
-/** @param {Ink} pen @param {string} words @param {number} left @param {number} right @param {number} height */
+/** @param {Context2D} pen @param {string} words @param {number} left @param {number} right @param {number} height */
 function drawLength(pen, words, left, right, height) {
   pen.font = smallFont();
   pen.textAlign = "center";

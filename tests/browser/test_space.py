@@ -21,7 +21,7 @@ CHANGED = (
     "of viser in pyproject.toml. Missing: "
 )
 SMALL = {"width": 1024, "height": 576}
-SETTLED = "__cocalibSpace.frameShown() === __cocalib.state.cursor && __cocalibSpace.lookShown().index === __cocalib.state.cursor"
+SETTLED = "__cocalibSpace.frameShown() === __cocalib.state.cursor && __cocalibSpace.spaceFrame().index === __cocalib.state.cursor"
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def solved(page: Driver, workspace: Workspace, project_root: Path) -> Driver:
     page.until(
         "__cocalib.state.view.clicks.length === 20 && !__cocalib.state.view.solving && __cocalib.state.placementsKnown"
     )
-    page.until("__cocalibSpace.lookShown()?.reflectors.length === 20 && __cocalibSpace.pickable().length > 0")
+    page.until("__cocalibSpace.spaceFrame()?.reflectors.length === 20 && __cocalibSpace.pickable().length > 0")
     return page
 
 
@@ -128,12 +128,12 @@ def hidden_and_enlarged(page: Driver) -> None:
     page.until(f"{box % 'space'} === {box % 'image-pane'}")
     page.press("v")
     page.until("document.getElementById('space').clientHeight < 40")
-    before = page.value("__cocalibSpace.lookShown().number")
+    before = page.value("__cocalibSpace.spaceFrame().number")
     page.press("ArrowRight")
     page.until("__cocalib.state.overlay?.index === __cocalib.state.cursor")
     page.page.reload()
     page.until("__cocalib.state.shown && document.getElementById('space').clientHeight < 40")
-    assert page.value("__cocalibSpace.lookShown()") is None, f"nothing after number {before}, since it is hidden"
+    assert page.value("__cocalibSpace.spaceFrame()") is None, f"nothing after number {before}, since it is hidden"
     page.press("v")
     page.until(SETTLED)
     assert page.value("document.getElementById('space').clientHeight") > 150
@@ -185,7 +185,7 @@ def test_without_images_returns_and_placements_can_be_picked_too(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look", viewport=SMALL)
-    page.until("__cocalib.state.placementsKnown && __cocalibSpace.lookShown()?.placements.length >= 10")
+    page.until("__cocalib.state.placementsKnown && __cocalibSpace.spaceFrame()?.placements.length >= 10")
     assert not page.page.is_visible("#space-camera")
     open_views(page)
     page.page.select_option("#space-colour", "height")

@@ -38,7 +38,7 @@ from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
 from cocalib.report.making import subject_of, watched
 from cocalib.report.page import report_html
-from cocalib.report.subject import Judged
+from cocalib.report.subject import RecordingEvidence
 
 _Made = TypeVar("_Made")
 _UNREACHED = frozenset(
@@ -372,7 +372,7 @@ def report_session(solved: SolvedSession, judged: JudgedSession | None, recordin
         subject_of(solved.found, calibration, CALIBRATION_FILE),
         inputs=(own,),
         recording=watched(recording, calibration, recording.fingerprint(), doubts),
-        judged=None if judged is None else Judged(judged.evaluation, solved.clicks),
+        judged=None if judged is None else RecordingEvidence(judged.evaluation, solved.clicks),
     )
     return report_html(subject)
 

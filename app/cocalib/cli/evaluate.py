@@ -69,7 +69,7 @@ class Evaluate:
             raise InputError("evaluate needs a recording, or --report FILE.html; see cocalib evaluate --help")
         if self.against is not None:
             raise InputError("--against is for the report; give --report FILE.html, or see cocalib check --against")
-        return self._told(*self._evaluation(self.calibration))
+        return self._print_report(*self._evaluation(self.calibration))
 
     def _with_places(self) -> "Evaluate":
         """Take what follows --require and is no limit as files of the recording."""
@@ -84,7 +84,7 @@ class Evaluate:
         """Return the limits on the stated error."""
         return tuple(one for one in self.require if one not in _LEVELS)
 
-    def _told(
+    def _print_report(
         self, found: "ImportedCalibration", calibration: "Calibration | None", evaluation: "Evaluation | None"
     ) -> int:
         """Print the figures and what is required; return the exit code."""
@@ -170,7 +170,7 @@ class Evaluate:
             write_whole(path, print_pdf(html) if path.suffix.lower() in _PDF else html)
             print(f"written to {path}", file=sys.stderr if self.json else sys.stdout)
         evaluation = None if subject.judged is None else subject.judged.evaluation
-        return self._told(subject.found, subject.calibration, evaluation)
+        return self._print_report(subject.found, subject.calibration, evaluation)
 
     def _subject(self) -> "ReportSubject":
         from cocalib.report.making import against_of, known_calibration, subject_of
@@ -222,7 +222,7 @@ class Evaluate:
         """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
         from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
         from cocalib.report.making import known_calibration
-        from cocalib.report.subject import Judged
+        from cocalib.report.subject import RecordingEvidence
 
         options = self.judging.evidence.options()
         clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [subject.found])
@@ -230,7 +230,7 @@ class Evaluate:
         if not clicks and boxes is None:
             return subject, ()
         evaluation = self._evaluated(calibration, recording, clicks, boxes, labels, options)
-        subject = replace(subject, judged=Judged(evaluation, clicks))
+        subject = replace(subject, judged=RecordingEvidence(evaluation, clicks))
         if other is None or self.against is None:
             return subject, ()
         rival = known_calibration(other, self.against.name, camera=calibration.camera)

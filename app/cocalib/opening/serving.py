@@ -1,4 +1,4 @@
-"""Serve recordings until a signal comes; a desk answers pages that choose one, also after what went wrong with another."""
+"""Serve recordings until a signal comes; the chooser answers pages, also after what went wrong with another."""
 
 import contextlib
 import sys
@@ -42,7 +42,7 @@ _SOON_S = 0.2
 """Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
 
 
-class OpeningDesk:
+class RecordingChooser:
     """Knows what is open and what can be chosen. Used by the main thread and by those that answer pages.
 
     Attributes:
@@ -210,19 +210,19 @@ def serve(first: Choice | None, serving: Serving) -> int:
     """
     if first is None and not serving.asks:
         raise RecordingError("no recording given; name one or more .bag, .mcap, .db3 files or bag folders")
-    desk = OpeningDesk(serving.recent, serving.root)
+    chooser = RecordingChooser(serving.recent, serving.root)
     choice, was_served = first, False
-    with _service(first, serving, desk) as service:
+    with _service(first, serving, chooser) as service:
         while True:
             problem = _Problem()
             try:
                 with problem.kept() if serving.asks else contextlib.nullcontext():
-                    if choice is not None and _served_to_the_end(choice, service, desk, serving):
+                    if choice is not None and _served_to_the_end(choice, service, chooser, serving):
                         return 0
                 if choice is not None and problem.part is not None:
                     choice = choice.without(problem.part)
                 if choice is None or problem.words:
-                    _ask(choice, problem.words, service, desk)
+                    _ask(choice, problem.words, service, chooser)
                 else:
                     was_served = True
             except KeyboardInterrupt:
@@ -230,7 +230,7 @@ def serve(first: Choice | None, serving: Serving) -> int:
                     raise
                 _say_stopped()
                 return 2 if problem.words and not was_served else 0
-            choice = desk.take()
+            choice = chooser.take()
             service.start_over(_opening(choice))
 
 
@@ -263,7 +263,7 @@ class _Problem:
         self.words = sentence(line)
 
 
-def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serving: Serving) -> bool:
+def _served_to_the_end(choice: Choice, service: Service, chooser: RecordingChooser, serving: Serving) -> bool:
     """Open and serve a recording; return False if a page chose something else.
 
     Raises:
@@ -272,7 +272,7 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     with ExitStack() as stack:
         opened = open_choice(choice, stack, service.tell)
         workspace, settled = opened.workspace, choice.settled()
-        desk.put(_choices_of(settled, opened), settled, opened)
+        chooser.put(_choices_of(settled, opened), settled, opened)
         if not choice.is_sample:
             serving.recent.add(choice.paths, choice.title, len(workspace.session.clicks))
         goes_on = service.serve(workspace, opened.recording)
@@ -284,13 +284,13 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     return not goes_on
 
 
-def _ask(choice: Choice | None, problem: str, service: Service, desk: OpeningDesk) -> None:
+def _ask(choice: Choice | None, problem: str, service: Service, chooser: RecordingChooser) -> None:
     """Ask the page what to open, and wait for its answer."""
     choices = OpeningChoices(0) if choice is None else OpeningChoices(0, choice.title, problem)
     if choice is not None:
         with error_boundary("listing what can be chosen", lambda _line: None):  # `problem` says what is wrong
             choices = _choices_after(choice, problem)
-    service.ask(desk.put(choices, choice))
+    service.ask(chooser.put(choices, choice))
 
 
 def _say_stopped() -> None:
@@ -298,17 +298,17 @@ def _say_stopped() -> None:
         print("\nStopped.")
 
 
-def _service(first: Choice | None, serving: Serving, desk: OpeningDesk) -> Service:
+def _service(first: Choice | None, serving: Serving, chooser: RecordingChooser) -> Service:
     """Return the service; it serves the page of a large recording before the recording is open."""
     if first is None:
         nothing = Opening("", "Choose a recording")
-        return Service(serving.link, nothing, lambda: None, let_in_after_s=_SOON_S, desk=desk)
+        return Service(serving.link, nothing, lambda: None, let_in_after_s=_SOON_S, opening_service=chooser)
     return Service(
         serving.link,
         _opening(first),
         partial(first_image, () if first.follow else first.paths, with_remembered(first)),
         let_in_after_s=0.0 if first.follow or _size_bytes(first) >= _LARGE_BYTES else _SOON_S,
-        desk=desk,
+        opening_service=chooser,
     )
 
 

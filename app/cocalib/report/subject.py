@@ -45,7 +45,7 @@ class Watched:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class RecordingEvidence:
     """What a recording says of the calibration.
 
     Attributes:
@@ -96,7 +96,7 @@ class ReportSubject:
     version: str
     inputs: tuple[InputFile, ...] = ()
     recording: Watched | None = None
-    judged: Judged | None = None
+    judged: RecordingEvidence | None = None
     against: Against | None = None
     required: tuple[str, ...] = ()
 

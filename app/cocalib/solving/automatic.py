@@ -14,7 +14,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.proposing import ViewProgress
 from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
-from calib_core.results.confirmation import nobody_confirmed
+from calib_core.results.confirmation import unconfirmed_warning
 from calib_core.results.verdict import verdict_on
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving.solving import solve_clicks
@@ -108,7 +108,7 @@ def solve_placed_clicks(
     if isinstance(outcome, Unsolvable) or placed.unconfirmed is None:
         return outcome
     count = sum(click.counts for click in placed.clicks)
-    warned = dataclasses.replace(outcome, warnings=(*outcome.warnings, nobody_confirmed(placed.unconfirmed, count)))
+    warned = dataclasses.replace(outcome, warnings=(*outcome.warnings, unconfirmed_warning(placed.unconfirmed, count)))
     refusal = refusal_of(warned, outcome.unpaired)
     return warned if refusal is None else refusal
 

@@ -16,7 +16,7 @@ from calib_core.results import Calibration
 from cocalib.session.state import Session
 from cocalib.view.reference import Reference, shown_calibration
 from cocalib.web.messages.outgoing import Overlay, OverlayGuess
-from cocalib.web.messages.space_messages import RadarLook, RadarReturn
+from cocalib.web.messages.space_messages import RadarFrame, RadarReturn
 
 _NEAREST_WITHIN_S = 0.3
 _MOST_RETURNS = 4000
@@ -137,7 +137,7 @@ def pixels_of(calibration: Calibration | None, points_m: Points3) -> Points2:
     return pixels
 
 
-def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions) -> RadarLook:
+def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions) -> RadarFrame:
     """Return the returns of the last seconds, seen from above.
 
     Args:
@@ -147,7 +147,7 @@ def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions)
         options: which returns can be the reflector.
     """
     returns = Returns.of(trail, time, options, RadarErrors().corrected).thinned(_MOST_RETURNS)
-    return RadarLook(index, returns.messages(pixels_of(None, returns.points_m)))
+    return RadarFrame(index, returns.messages(pixels_of(None, returns.points_m)))
 
 
 def overlay_of(

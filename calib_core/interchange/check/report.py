@@ -55,9 +55,9 @@ _SUMMARIES: dict[Verdict, tuple[str, ...]] = {
     ),
 }
 _ASSUMED = "what this pose rests on was assumed when it was imported, and its own check point shows only that the file is whole"
-_OWN_WORD = frozenset({"check-point", "pairs"})
+_SELF_EVIDENCE = frozenset({"check-point", "pairs"})
 """Results of what a file says of itself: no proof of a pose whose meaning was assumed."""
-_WORD_OF_ANOTHER = {"against": frozenset({"agrees"}), "of": frozenset({"same-pose", "same-lens"})}
+_BORROWED_EVIDENCE = {"against": frozenset({"agrees"}), "of": frozenset({"same-pose", "same-lens"})}
 """Results of what another file says: no proof either if the meaning of that one's pose was assumed."""
 _DIFFERENCES = frozenset({"disagrees"})
 _ANY_SIZE_PX = (1000, 1000)
@@ -217,8 +217,8 @@ def _own_camera(imported: ImportedCalibration) -> Camera | None:
 
 def _no_proof(imported: ImportedCalibration, **others: ImportedCalibration | None) -> frozenset[str]:
     """Return the codes of the results that prove nothing, because what they rest on was assumed."""
-    codes = _OWN_WORD if imported.evidence == "imported_assumed" or _by_own_verdict(imported) else frozenset()
-    return codes.union(*(_WORD_OF_ANOTHER[option] for option, other in others.items() if _is_assumed(other)))
+    codes = _SELF_EVIDENCE if imported.evidence == "imported_assumed" or _by_own_verdict(imported) else frozenset()
+    return codes.union(*(_BORROWED_EVIDENCE[option] for option, other in others.items() if _is_assumed(other)))
 
 
 def _by_own_verdict(imported: ImportedCalibration) -> list[CheckResult]:

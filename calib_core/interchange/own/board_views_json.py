@@ -56,7 +56,7 @@ class BoardViews:
         """
         if self.board != board:
             raise InputError(
-                f"{file}: views of a {_said(self.board)}, but the board is a {_said(board)}; "
+                f"{file}: views of a {_caption(self.board)}, but the board is a {_caption(board)}; "
                 "give that board, or name another file"
             )
         if self.source.sha256 != source.sha256 or self.source.images != source.images:
@@ -66,7 +66,7 @@ class BoardViews:
             )
 
 
-def _said(board: Board) -> str:
+def _caption(board: Board) -> str:
     parts = [f"{board.text} with {1e3 * board.square_m:g} mm"]
     if board.marker_m:
         parts.append(f"{1e3 * board.marker_m:g} mm")

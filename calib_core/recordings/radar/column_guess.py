@@ -116,7 +116,7 @@ class DescribedColumn:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picked:
+class ColumnMatch:
     """A column and what it means.
 
     Attributes:
@@ -162,11 +162,11 @@ class Picked:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chosen:
+class ColumnChoice:
     """The columns in use by quantity.
 
     Attributes:
-        picked: by quantity.
+        matched: by quantity.
         sigma: standard deviations by quantity.
         vague: angles whose names fit azimuth and elevation alike, if they had to be told apart.
         other_azimuths: columns with further hypotheses.
@@ -174,9 +174,9 @@ class Chosen:
         rivals: of quantities of a position, other columns with as plain a name.
     """
 
-    picked: dict[str, Picked]
-    sigma: dict[str, Picked]
-    vague: tuple[Picked, ...] = ()
+    matched: dict[str, ColumnMatch]
+    sigma: dict[str, ColumnMatch]
+    vague: tuple[ColumnMatch, ...] = ()
     other_azimuths: tuple[str, ...] = ()
     unused_heights: tuple[str, ...] = ()
     rivals: Mapping[str, str] = field(default_factory=dict)
@@ -203,12 +203,12 @@ def guess_columns(
         RecordingError: the values of a table fit two units alike; the message has the --map that says which.
     """
     chosen = choose(columns, rules, stated)
-    picked = chosen.picked
-    if not known and not _looks_like_radar(picked):
+    matched = chosen.matched
+    if not known and not _looks_like_radar(matched):
         return None
-    cartesian, polar = {"x", "y"} <= picked.keys(), {"range", "azimuth"} <= picked.keys()
-    unfilled = cartesian and not (picked["x"].column.filled or picked["y"].column.filled)
-    guess = _Guess(chosen, remarks, rules, stated)
+    cartesian, polar = {"x", "y"} <= matched.keys(), {"range", "azimuth"} <= matched.keys()
+    unfilled = cartesian and not (matched["x"].column.filled or matched["y"].column.filled)
+    guess = _UnitInference(chosen, remarks, rules, stated)
     if cartesian and not (polar and unfilled):
         plan = guess.cartesian()
     elif polar:
@@ -218,19 +218,19 @@ def guess_columns(
     return guess.flags(guess.amplitude(guess.speed(guess.noise(plan))), columns)
 
 
-def _looks_like_radar(picked: Mapping[str, Picked]) -> bool:
+def _looks_like_radar(matched: Mapping[str, ColumnMatch]) -> bool:
     """Return whether there is a position, and something that only radars measure."""
-    if {"range", "azimuth"} <= picked.keys():
+    if {"range", "azimuth"} <= matched.keys():
         return True
-    amplitude = "amplitude" in picked and picked["amplitude"].meaning.rank != 1
-    radial = "doppler" in picked and picked["doppler"].meaning.kind == "radial"
-    return {"x", "y"} <= picked.keys() and (amplitude or radial or {"vx", "vy"} <= picked.keys())
+    amplitude = "amplitude" in matched and matched["amplitude"].meaning.rank != 1
+    radial = "doppler" in matched and matched["doppler"].meaning.kind == "radial"
+    return {"x", "y"} <= matched.keys() and (amplitude or radial or {"vx", "vy"} <= matched.keys())
 
 
 def fill_in(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
     """Add the speed and the amplitude that a plan made by plain names lacks, and a second hypothesis of the azimuth."""
     chosen = choose(columns)
-    speed, level = chosen.picked.get("doppler"), chosen.picked.get("amplitude")
+    speed, level = chosen.matched.get("doppler"), chosen.matched.get("amplitude")
     if plan.doppler is None and not plan.velocity and speed is not None and speed.meaning.kind == "radial":
         plan = replace(plan, doppler=speed.name, doppler_scale=speed.unit.scale if speed.unit else 1.0)
     if plan.amplitude is None and level is not None:
@@ -240,42 +240,42 @@ def fill_in(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
 
 def choose(
     columns: Sequence[DescribedColumn], rules: Rules = "message", stated: StatedReading = NOTHING_STATED
-) -> Chosen:
+) -> ColumnChoice:
     """Choose a column for each quantity."""
-    pickeds = _picked_of_table(columns, stated) if rules == "table" else _picked_of_message(columns)
-    pickeds.sort(key=lambda one: one.order)
-    picked: dict[str, Picked] = {}
-    sigma: dict[str, Picked] = {}
-    for one in pickeds:
+    matches = _matches_of_table(columns, stated) if rules == "table" else _matches_of_message(columns)
+    matches.sort(key=lambda one: one.order)
+    matched: dict[str, ColumnMatch] = {}
+    sigma: dict[str, ColumnMatch] = {}
+    for one in matches:
         if one.meaning.sigma:
             sigma.setdefault(one.quantity, one)
         elif not one.meaning.second and one.meaning.kind != "vague":
-            picked.setdefault(one.quantity, one)
-    first = [one for one in pickeds if not one.meaning.sigma and not one.meaning.second]
-    picked |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
-    second = (one for one in pickeds if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
-    others = tuple(one.name for one in second) if "azimuth" in picked else ()
+            matched.setdefault(one.quantity, one)
+    first = [one for one in matches if not one.meaning.sigma and not one.meaning.second]
+    matched |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
+    second = (one for one in matches if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
+    others = tuple(one.name for one in second) if "azimuth" in matched else ()
     vague = [one for one in first if one.meaning.kind == "vague"]
-    told_apart = _told_apart(vague, picked)
-    used = [value.name for value in picked.values()]
+    assigned = _assign_vague_angles(vague, matched)
+    used = [value.name for value in matched.values()]
     unused = tuple(one.name for one in vague if one.name not in used)
     heights = tuple(one.name for one in first if one.quantity == "z" and one.column.filled)
     rivals: dict[str, str] = {}
     for one in first if rules == "table" else ():
-        own = picked[one.quantity]
+        own = matched[one.quantity]
         if one is not own and one.quantity in ("x", "y", "z", *_POLAR) and (one.unit is None) == (own.unit is None):
             rivals[one.quantity] = ", ".join(filter(None, (rivals.get(one.quantity), one.name)))
-    return Chosen(picked, sigma, told_apart, others, () if "elevation" in picked else (*unused, *heights), rivals)
+    return ColumnChoice(matched, sigma, assigned, others, () if "elevation" in matched else (*unused, *heights), rivals)
 
 
-def _picked_of_message(columns: Sequence[DescribedColumn]) -> list[Picked]:
+def _matches_of_message(columns: Sequence[DescribedColumn]) -> list[ColumnMatch]:
     """Return the columns that mean something; none if one of them is not a radar's."""
     if any(has_word(column.name, *_NOT_RADARS) for column in columns):
         return []
-    pickeds = [one for one in (_picked(column, name) for column, name in _stripped(columns)) if one is not None]
+    matches = [one for one in (_match(column, name) for column, name in _stripped(columns)) if one is not None]
     if any(has_word(column.name, *_SIZES) for column in columns):
-        pickeds = [picked for picked in pickeds if not has_word(picked.name, "height")]  # of an object
-    return pickeds
+        matches = [matched for matched in matches if not has_word(matched.name, "height")]  # of an object
+    return matches
 
 
 def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
@@ -288,19 +288,19 @@ def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn,
     ]
 
 
-def _picked(column: DescribedColumn, name: str) -> Picked | None:
+def _match(column: DescribedColumn, name: str) -> ColumnMatch | None:
     meaning = meaning_of(name) or meaning_of(column.name)
     if meaning is None:
         return None
     if meaning.kind == "vague" and (angle := angle_in(column.comment)):
         meaning = replace(meaning, kind=angle)
     if meaning.unit is not None:
-        return Picked(column, meaning, meaning.unit, "name")
+        return ColumnMatch(column, meaning, meaning.unit, "name")
     unit = unit_in(column.comment, dimension_of(meaning.quantity), integer=column.integer)
-    return Picked(column, meaning, unit, _COMMENT if unit else "")
+    return ColumnMatch(column, meaning, unit, _COMMENT if unit else "")
 
 
-def _picked_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[Picked]:
+def _matches_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[ColumnMatch]:
     """Return the columns that --map chooses, and of the other quantities those whose names mean something."""
     given = {one.column: one for one in stated.column_map}
     taken = {value.quantity for value in given.values()}
@@ -329,7 +329,7 @@ def _picked_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) 
         plain = one is not None or is_plain(split_unit(column.name)[0], meaning)
         rank = meaning.rank + (not plain) + 10 * (unit is None)  # a stated unit is preferred to a plainer name
         why = f"--map {one.words}" if one else "name"
-        found.append(Picked(column, replace(meaning, rank=rank), unit, why if unit else "", plain, one))
+        found.append(ColumnMatch(column, replace(meaning, rank=rank), unit, why if unit else "", plain, one))
     return found
 
 
@@ -368,47 +368,47 @@ def split_unit(written: str) -> tuple[str, str]:
     return (bracketed["name"], bracketed["unit"].strip()) if bracketed else (text, "")
 
 
-def _together(found: Sequence[Picked], axes: tuple[str, str, str]) -> dict[str, Picked]:
+def _together(found: Sequence[ColumnMatch], axes: tuple[str, str, str]) -> dict[str, ColumnMatch]:
     """Choose x and y (and z) of one position, not of two."""
-    stems: dict[tuple[str, ...], dict[str, Picked]] = {}
-    for picked in found:
-        if picked.quantity in axes:
-            stems.setdefault(picked.stem, {}).setdefault(picked.quantity, picked)
+    stems: dict[tuple[str, ...], dict[str, ColumnMatch]] = {}
+    for matched in found:
+        if matched.quantity in axes:
+            stems.setdefault(matched.stem, {}).setdefault(matched.quantity, matched)
     whole = [group for group in stems.values() if axes[0] in group and axes[1] in group]
     return min(whole, key=lambda group: (not group[axes[0]].column.filled, group[axes[0]].order), default={})
 
 
-def _told_apart(vague: Sequence[Picked], picked: dict[str, Picked]) -> tuple[Picked, ...]:
+def _assign_vague_angles(vague: Sequence[ColumnMatch], matched: dict[str, ColumnMatch]) -> tuple[ColumnMatch, ...]:
     """Take phi, theta, angle and the like for azimuth and elevation; return them if there was more than one."""
-    if not vague or "azimuth" in picked:
+    if not vague or "azimuth" in matched:
         return ()
-    if len(vague) == 1 or "elevation" in picked:
-        picked["azimuth"] = vague[0]
+    if len(vague) == 1 or "elevation" in matched:
+        matched["azimuth"] = vague[0]
         return ()
     first, second = vague[:2]
     if _span(second) > 1.5 * _span(first):
         first, second = second, first  # radars see wider than high
-    picked["azimuth"], picked["elevation"] = first, second
+    matched["azimuth"], matched["elevation"] = first, second
     return first, second
 
 
-def _span(one: Picked) -> float:
+def _span(one: ColumnMatch) -> float:
     values = one.column.values[np.isfinite(one.column.values)]
     return float(np.ptp(values)) if len(values) else 0.0
 
 
-class _Guess:
+class _UnitInference:
     """The units, directions and assumptions of chosen columns."""
 
-    def __init__(self, chosen: Chosen, remarks: str, rules: Rules, stated: StatedReading) -> None:
-        self.picked, self.chosen, self.remarks = chosen.picked, chosen, remarks
+    def __init__(self, chosen: ColumnChoice, remarks: str, rules: Rules, stated: StatedReading) -> None:
+        self.matched, self.chosen, self.remarks = chosen.matched, chosen, remarks
         self.directed = stated.axes is not None and stated.axes.directed
         self.rules, self.of_table, self.noun = rules, rules == "table", _NOUNS[rules]
-        self.agreed = _agreement(chosen.picked)
+        self.agreed = _agreement(chosen.matched)
 
     def cartesian(self) -> ColumnPlan:
         """Plan a position from x, y and perhaps z."""
-        group = tuple(self.picked[axis] for axis in "xyz" if axis in self.picked)
+        group = tuple(self.matched[axis] for axis in "xyz" if axis in self.matched)
         standard = self.rules == "ros" or all(one.column.standard for one in group)
         directions, reasons, about_axes = self._directions(group, standard=standard)
         sides = () if self.of_table else directions
@@ -418,7 +418,7 @@ class _Guess:
             for one, unit, direction, reason in zip(group, units, directions, reasons, strict=False)
         ]
         scales = _three([one.sign * unit.scale for one, unit in zip(group, units, strict=True)], 1.0)
-        claimed = [self.picked.get(name) for name in (_POLAR if self.of_table else _POLAR[:2])]
+        claimed = [self.matched.get(name) for name in (_POLAR if self.of_table else _POLAR[:2])]
         angle = self._claimed_angle(readings)
         usual = (units[0], angle, claimed[1].unit if claimed[1] and claimed[1].unit else angle)
         return ColumnPlan(
@@ -432,12 +432,12 @@ class _Guess:
             ),
             other_azimuths=self.chosen.other_azimuths,
             readings=tuple(readings),
-            assumptions=(*_present(about, about_axes), *self._about_rivals(group, units)),
+            assumptions=(*_present(about, about_axes), *self._rival_assumptions(group, units)),
         )
 
     def _claimed_angle(self, readings: list[ColumnReading]) -> Unit:
         """Return the unit of an azimuth beside x and y that states none; say of a table's what shows it."""
-        azimuth = self.picked.get("azimuth")
+        azimuth = self.matched.get("azimuth")
         if self.agreed is None:
             by_size = self.of_table and azimuth is not None
             return _angle_unit(azimuth.column.values, integer=False).unit if by_size and azimuth else _unit("rad")
@@ -448,7 +448,7 @@ class _Guess:
 
     def polar(self) -> ColumnPlan:
         """Plan a position from range, azimuth and perhaps elevation."""
-        distance, azimuth, elevation = self.picked["range"], self.picked["azimuth"], self.picked.get("elevation")
+        distance, azimuth, elevation = self.matched["range"], self.matched["azimuth"], self.matched.get("elevation")
         (unit,), why, about = self._lengths((distance,), standard=False)
         angles = tuple(_present(azimuth, elevation))
         angle, why_angle, about_angle = self._angle(angles)
@@ -470,7 +470,7 @@ class _Guess:
             side, why = ("downwards", _COMMENT) if down else ("upwards", "as usual")
             why = f"unit: {why_angle}; sign: {why}"
             readings.append(ColumnReading("elevation", elevation.name, units[-1].name, side, why))
-        vague, unused = self._about_vague(), self._about_unused()
+        vague, unused = self._vague_assumption(), self._unused_assumption()
         return ColumnPlan(
             position=tuple(one.name for one in (distance, *angles)),
             polar=True,
@@ -483,12 +483,17 @@ class _Guess:
             readings=tuple(readings),
             assumptions=(
                 *_present(about, about_angle, about_sign, vague, unused),
-                *self._about_rivals((distance, *angles), (unit, *units)),
+                *self._rival_assumptions((distance, *angles), (unit, *units)),
             ),
         )
 
     def _lengths(
-        self, group: tuple[Picked, ...], *, standard: bool, proven: "Finding | None" = None, sides: tuple[str, ...] = ()
+        self,
+        group: tuple[ColumnMatch, ...],
+        *,
+        standard: bool,
+        proven: "Finding | None" = None,
+        sides: tuple[str, ...] = (),
     ) -> tuple[list[Unit], str, ColumnAssumption | None]:
         """Return the unit of each column of a position or range, what states it, and what is assumed."""
         stated = next((one for one in group if one.unit), None)
@@ -502,7 +507,7 @@ class _Guess:
                 return units, why, None
             what = f"{names} would reach {largest:.4g} m in {usual.name} ({why})"
             text = f"{what}, which is too far; the unit is taken all the same"
-            return units, why, self._about_units("length-unit", text, group, usual, sides)
+            return units, why, self._unit_assumption("length-unit", text, group, usual, sides)
         largest = farthest(*(one.column.values for one in group))
         finding = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
         units = [finding.unit] * len(group)
@@ -510,9 +515,9 @@ class _Guess:
             return units, finding.why, None
         self._refuse_either(group, finding)
         text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
-        return units, "assumed", self._about_units("length-unit", text, group, finding.unit, sides)
+        return units, "assumed", self._unit_assumption("length-unit", text, group, finding.unit, sides)
 
-    def _refuse_either(self, group: Sequence[Picked], found: "Finding") -> None:
+    def _refuse_either(self, group: Sequence[ColumnMatch], found: "Finding") -> None:
         """Refuse a table whose values fit two units alike."""
         if self.of_table and found.rival is not None:
             maps = (" ".join(_map(one, unit) for one in group) for unit in (found.unit, found.rival))
@@ -522,8 +527,8 @@ class _Guess:
                 f"say which with {' or '.join(maps)}"
             )
 
-    def _about_units(
-        self, key: str, text: str, group: Sequence[Picked], unit: Unit, sides: tuple[str, ...] = ()
+    def _unit_assumption(
+        self, key: str, text: str, group: Sequence[ColumnMatch], unit: Unit, sides: tuple[str, ...] = ()
     ) -> ColumnAssumption:
         """Return the assumption of a unit; of a position that has directions, confirmed in the radar's own axes."""
         targets = [_AS_MAPPED[side] for side in sides[: len(group)]] if sides else [(one.quantity, "") for one in group]
@@ -533,10 +538,10 @@ class _Guess:
 
     def _by_range(self) -> "Finding | None":
         """Find the unit of x, y and z by a range whose unit is stated."""
-        distance = self.picked.get("range")
+        distance = self.matched.get("range")
         if distance is None or distance.unit is None or not (self.of_table or self.agreed):
             return None
-        lengths = np.sqrt(sum(np.square(self.picked[axis].column.values) for axis in "xyz" if axis in self.picked))
+        lengths = np.sqrt(sum(np.square(self.matched[axis].column.values) for axis in "xyz" if axis in self.matched))
         with np.errstate(all="ignore"):
             ratio = distance.column.values * distance.unit.scale / lengths
         ratio = ratio[np.isfinite(ratio) & (ratio > 0)]
@@ -546,17 +551,21 @@ class _Guess:
         return None
 
     def _directions(
-        self, group: tuple[Picked, ...], *, standard: bool
+        self, group: tuple[ColumnMatch, ...], *, standard: bool
     ) -> tuple[tuple[str, str, str], list[str], ColumnAssumption | None]:
         """Return where x, y and z point, what states each, and what is assumed."""
         if self.of_table:
-            return self._as_documented(group)
+            return self._documented_directions(group)
         said = dict(axes_in(self.remarks)) | {
             one.quantity: side for one in group if (side := axis_side(one.column.comment)) is not None
         }
         whole = _whole(said)
         if whole:
-            return whole, [_COMMENT, _COMMENT, _COMMENT if "z" in said else "as usual"], _about_up(group, said, whole)
+            return (
+                whole,
+                [_COMMENT, _COMMENT, _COMMENT if "z" in said else "as usual"],
+                _up_assumption(group, said, whole),
+            )
         if standard:
             return ("forward", "left", "up"), [_ROS] * 3, None
         forward, why = self._forward(group, said)
@@ -566,7 +575,7 @@ class _Guess:
         reasons = {forward: why, lateral: why_side or "assumed"}
         directions = (sides["x"], sides["y"], "up")
         if why != "assumed" and why_side:
-            return directions, [reasons["x"], reasons["y"], "as usual"], _about_up(group, said, directions)
+            return directions, [reasons["x"], reasons["y"], "as usual"], _up_assumption(group, said, directions)
         x, y = (one.name for one in group[:2])
         known = f" (forward: {why})" if why != "assumed" else ""
         text = (
@@ -576,8 +585,8 @@ class _Guess:
         about = _assume("axes", text, f"--radar-axes {','.join(directions)}", ("x", "y"), axes=True)
         return directions, [reasons["x"], reasons["y"], "as usual"], about
 
-    def _as_documented(
-        self, group: tuple[Picked, ...]
+    def _documented_directions(
+        self, group: tuple[ColumnMatch, ...]
     ) -> tuple[tuple[str, str, str], list[str], ColumnAssumption | None]:
         """Return the axes of the documentation, unless the values of a table show that x points to the right."""
         x, y = group[:2]
@@ -594,7 +603,7 @@ class _Guess:
         text = f"the directions of {x.name} and {y.name} are not stated; taken as forward and to the left"
         return directions, ["assumed"] * 3, _assume("axes", text, "--radar-axes forward,left,up", other, axes=True)
 
-    def _forward(self, group: tuple[Picked, ...], said: Mapping[str, Direction]) -> tuple[str, str]:
+    def _forward(self, group: tuple[ColumnMatch, ...], said: Mapping[str, Direction]) -> tuple[str, str]:
         """Return the forward axis, and what states it."""
         for axis in ("x", "y"):
             if said.get(axis) in ("forward", "backward"):
@@ -612,13 +621,13 @@ class _Guess:
         """Return where the lateral axis points, and what states it; "" if nothing does."""
         if said.get(lateral) in ("left", "right"):
             return said[lateral], _COMMENT
-        azimuth = self.picked.get("azimuth")
+        azimuth = self.matched.get("azimuth")
         turn = positive_side(azimuth.column.comment) if azimuth else None
         if self.agreed is not None and azimuth and turn in ("left", "right"):
             return (turn if self.agreed.toward > 0 else OPPOSITE[turn]), f"{azimuth.name} grows to the {turn}"
         return ("left" if forward == "x" else "right"), ""
 
-    def _angle(self, angles: tuple[Picked, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
+    def _angle(self, angles: tuple[ColumnMatch, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
         """Return the unit of angles, what states it, and what is assumed."""
         stated = next((angle for angle in angles if angle.unit), None)
         names = ", ".join(angle.name for angle in angles)
@@ -632,14 +641,14 @@ class _Guess:
                 return unit, stated.why, None
             but = f"although the values look like {finding.unit.name}: {finding.why}"
             text = f"{_are(names)} taken as {unit.name} ({stated.why}), {but}"
-            return unit, stated.why, self._about_units("angle-unit", text, angles, unit)
+            return unit, stated.why, self._unit_assumption("angle-unit", text, angles, unit)
         if finding.certain and not (self.of_table and finding.unit.name == "rad"):
             return finding.unit, finding.why, None
         self._refuse_either(angles, finding)
         text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
-        return finding.unit, "assumed", self._about_units("angle-unit", text, angles, finding.unit)
+        return finding.unit, "assumed", self._unit_assumption("angle-unit", text, angles, finding.unit)
 
-    def _azimuth_sign(self, azimuth: Picked, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
+    def _azimuth_sign(self, azimuth: ColumnMatch, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
         side = positive_side(azimuth.column.comment)
         if side not in ("left", "right") and "azimuth" in self.remarks.lower():
             line = next(line for line in self.remarks.splitlines() if "azimuth" in line.lower())
@@ -656,14 +665,14 @@ class _Guess:
         confirm += "" if self.of_table else f" (azimuth=-{name}{_flag(angle)} if it grows to the right)"
         return 1, "assumed", _assume("azimuth-sign", text, confirm, ("azimuth",), axes=True)
 
-    def _about_unused(self) -> ColumnAssumption | None:
+    def _unused_assumption(self) -> ColumnAssumption | None:
         if not self.chosen.unused_heights:
             return None
         names = ", ".join(self.chosen.unused_heights)
         text = f"the returns are taken as level with the radar; {names} may hold their elevation or height, and is not used"
         return _assume("field-meaning", text, CONFIRM_ALL, ("elevation",))
 
-    def _about_vague(self) -> ColumnAssumption | None:
+    def _vague_assumption(self) -> ColumnAssumption | None:
         if not self.chosen.vague:
             return None
         first, second = (one.name for one in self.chosen.vague)
@@ -674,7 +683,7 @@ class _Guess:
             "field-meaning", text, f"--map azimuth={first} --map elevation={second}", ("azimuth", "elevation")
         )
 
-    def _about_rivals(self, group: Sequence[Picked], units: Sequence[Unit]) -> list[ColumnAssumption]:
+    def _rival_assumptions(self, group: Sequence[ColumnMatch], units: Sequence[Unit]) -> list[ColumnAssumption]:
         """State which of two columns of a table with the same meaning is used."""
         return [
             _assume(
@@ -689,8 +698,8 @@ class _Guess:
 
     def noise(self, plan: ColumnPlan) -> ColumnPlan:
         """Add the standard deviations of range and angles."""
-        pickeds = [self.chosen.sigma.get(name) for name in _POLAR]
-        if not any(pickeds) or not (plan.polar or self.of_table):
+        matches = [self.chosen.sigma.get(name) for name in _POLAR]
+        if not any(matches) or not (plan.polar or self.of_table):
             return plan
         base = _unit("deg" if plan.degrees else "rad").scale
         usual = (
@@ -699,34 +708,34 @@ class _Guess:
             else plan.claimed_scales
         )
         own = [
-            (picked.unit.scale if picked and picked.unit else scale)
-            for picked, scale in zip(pickeds, usual, strict=True)
+            (matched.unit.scale if matched and matched.unit else scale)
+            for matched, scale in zip(matches, usual, strict=True)
         ]
         assumed = []
-        for name, one, scale in zip(_POLAR, pickeds, own, strict=True):
+        for name, one, scale in zip(_POLAR, matches, own, strict=True):
             if one and not one.unit and self.of_table:
                 unit = next((unit for unit in units_for(name) if math.isclose(unit.scale, scale)), units_for(name)[0])
                 text = f"{one.name} is taken as {unit.name}; the file does not state the unit"
                 assumed.append(_assume("noise-unit", text, _map(one, unit, f"sigma_{name}"), (f"sigma_{name}",)))
         return replace(
             plan,
-            sigma=_three([picked.name if picked else None for picked in pickeds], None),
+            sigma=_three([matched.name if matched else None for matched in matches], None),
             sigma_scales=(own[0], own[1] / base, own[2] / base),
             assumptions=(*plan.assumptions, *assumed),
         )
 
     def speed(self, plan: ColumnPlan) -> ColumnPlan:
         """Add the speed."""
-        doppler = self.picked.get("doppler")
+        doppler = self.matched.get("doppler")
         group = (
-            (doppler,) if doppler else tuple(self.picked[name] for name in ("vx", "vy", "vz") if name in self.picked)
+            (doppler,) if doppler else tuple(self.matched[name] for name in ("vx", "vy", "vz") if name in self.matched)
         )
-        if doppler is None and ((plan.polar and not self.of_table) or not {"vx", "vy"} <= self.picked.keys()):
+        if doppler is None and ((plan.polar and not self.of_table) or not {"vx", "vy"} <= self.matched.keys()):
             return plan
         names = tuple(one.name for one in group)
         in_ros_frame = self.rules == "ros" and plan.scales[0] == 1.0
         others = ("vx", "vy", "vz") if self.of_table else ()
-        speeds = (*group, *(self.picked[name] for name in others if name in self.picked))
+        speeds = (*group, *(self.matched[name] for name in others if name in self.matched))
         stated = next((speed for speed in speeds if speed.unit), None)
         assumptions = plan.assumptions
         if stated and stated.unit:
@@ -751,7 +760,7 @@ class _Guess:
 
     def amplitude(self, plan: ColumnPlan) -> ColumnPlan:
         """Add the amplitude."""
-        one = self.picked.get("amplitude")
+        one = self.matched.get("amplitude")
         if one is None:
             return plan
         unit = one.unit.name if one.unit else "not stated"
@@ -776,12 +785,12 @@ class _Guess:
             spoils_position=tuple(names[name].name for name in _INVALID_POSITION if name in names),
             spoils_doppler=tuple(names[name].name for name in _INVALID_DOPPLER if name in names),
             readings=(*plan.readings, *readings),
-            assumptions=(*plan.assumptions, *_about_sensors(columns)),
+            assumptions=(*plan.assumptions, *_sensor_assumptions(columns)),
             described=True,
         )
 
 
-def _about_sensors(columns: Sequence[DescribedColumn]) -> list[ColumnAssumption]:
+def _sensor_assumptions(columns: Sequence[DescribedColumn]) -> list[ColumnAssumption]:
     found = []
     for column in columns:
         words, values = set(words_of(column.name)), sorted(set(column.values.tolist()))
@@ -803,8 +812,8 @@ def _whole(said: Mapping[str, Direction]) -> tuple[str, str, str] | None:
     return found if len({_PLANES[side] for side in found}) == 3 else None
 
 
-def _about_up(
-    group: tuple[Picked, ...], said: Mapping[str, Direction], directions: tuple[str, str, str]
+def _up_assumption(
+    group: tuple[ColumnMatch, ...], said: Mapping[str, Direction], directions: tuple[str, str, str]
 ) -> ColumnAssumption | None:
     """Return the assumption that z points up, unless a comment says so or x and y make it so in a right-handed frame."""
     if len(group) < 3 or "z" in said or np.linalg.det(RadarAxes(directions).matrix) > 0:
@@ -823,7 +832,7 @@ def _assume(
     return ColumnAssumption(Assumption(key, "", text, confirm), quantities, axes, angle_unit)
 
 
-def _map(one: Picked, unit: Unit, quantity: str = "", minus: str = "") -> str:
+def _map(one: ColumnMatch, unit: Unit, quantity: str = "", minus: str = "") -> str:
     """Return the --map that states what a column is, for a shell."""
     minus = "-" if one.sign < 0 else minus
     return f"--map {_shell(f'{quantity or one.quantity}={minus}{one.name}{_flag(unit)}')}"
@@ -924,7 +933,7 @@ def _angle_unit(angles: Values, *, integer: bool) -> Finding:
     return Finding(_unit("deg"), False, f"only {why}")
 
 
-def _implausible(angle: Picked, unit: Unit, found: Finding) -> bool:
+def _implausible(angle: ColumnMatch, unit: Unit, found: Finding) -> bool:
     """Return whether an angle's values contradict its stated unit."""
     values = angle.column.values[np.isfinite(angle.column.values)]
     too_wide = float(np.abs(values).max(initial=0.0)) * unit.scale > 2 * np.pi + 0.01
@@ -966,11 +975,11 @@ class PolarAgreement:
     toward: int
 
 
-def _agreement(picked: Mapping[str, Picked]) -> PolarAgreement | None:
+def _agreement(matched: Mapping[str, ColumnMatch]) -> PolarAgreement | None:
     """Find the unit, sign and axis order in which an azimuth matches x and y; None if none matches clearly."""
-    if not {"x", "y", "azimuth"} <= picked.keys():
+    if not {"x", "y", "azimuth"} <= matched.keys():
         return None
-    angle, x, y = (picked[name].column.values for name in ("azimuth", "x", "y"))
+    angle, x, y = (matched[name].column.values for name in ("azimuth", "x", "y"))
     telling = np.isfinite(angle) & np.isfinite(x) & np.isfinite(y) & (np.abs(angle) > 0) & ((x != 0) | (y != 0))
     if np.count_nonzero(telling) < _ENOUGH // 2:
         return None

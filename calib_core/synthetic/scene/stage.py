@@ -22,7 +22,7 @@ from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, PairsL
 from calib_core.synthetic.scene.story import Resting, Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
 from calib_core.synthetic.scene.traffic import VehicleState, draw_movers, draw_passers_by, hidden_by
-from calib_core.synthetic.timeline import EVERYTHING, START_NS, Islands, SensorTimes, draw_islands, draw_times
+from calib_core.synthetic.timeline import EVERYTHING, START_NS, RecordedSegments, SensorTimes, draw_segments, draw_times
 
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
     from calib_core.synthetic.scene.board_waving import BoardWaving
@@ -46,7 +46,7 @@ class Stage:
         story: where person and reflector are at any time.
         frame_times: of the camera.
         antennas: the radar's, each with its times; one, or a near and a far one.
-        islands: the recorded parts of the story.
+        segments: the recorded parts of the story.
         clutter: static objects that the radar sees, in the world.
         clutter_bias: (k, 3) the constant error of each of them: range [m], sines of azimuth and elevation.
         reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
@@ -61,7 +61,7 @@ class Stage:
     story: Story
     frame_times: SensorTimes
     antennas: tuple[Antenna, ...]
-    islands: Islands
+    segments: RecordedSegments
     clutter: tuple[Scatterer, ...]
     clutter_bias: Points3
     reflector_bias: Points3
@@ -91,7 +91,7 @@ class Stage:
         rig = _other_rig(self.rig, self.options)
         if rig is None:
             return None
-        times = _frame_times(child_rng(self.options, 24), self.story, self.islands, self.options)
+        times = _frame_times(child_rng(self.options, 24), self.story, self.segments, self.options)
         return replace(self, rig=rig, frame_times=times, waving=None)
 
     @property
@@ -101,7 +101,7 @@ class Stage:
 
     def recorded_span(self, start_s: float, end_s: float) -> tuple[TimeNs, TimeNs]:
         """Return the first and the last time, on the camera's clock, at which a part of the story is recorded."""
-        recorded_s = self.islands.first_after_s(start_s), self.islands.last_before_s(end_s)
+        recorded_s = self.segments.first_after_s(start_s), self.segments.last_before_s(end_s)
         first, last = (TimeNs(START_NS + round(time_s * NS_PER_S)) for time_s in recorded_s)
         return first, last
 
@@ -125,11 +125,15 @@ def set_stage(options: SimulationOptions) -> Stage:
     rig = random_rig(child_rng(options, 0), camera=camera, options=options.rig)
     positions = _positions(child_rng(options, 1), scene, added, rig, options)
     story = _story(positions, scene, options)
-    islands = _islands(story, options)
+    segments = _segments(story, options)
     profile = profile_with(options.radar, options.defects)
-    frame_times = _frame_times(child_rng(options, 3), story, islands, options)
+    frame_times = _frame_times(child_rng(options, 3), story, segments, options)
     antennas = antennas_of(
-        options, profile, (child_rng(options, 4), child_rng(options, 14)), duration_s=story.duration_s, islands=islands
+        options,
+        profile,
+        (child_rng(options, 4), child_rng(options, 14)),
+        duration_s=story.duration_s,
+        segments=segments,
     )
     rng = child_rng(options, 5)
     bias_sigma = [0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma]
@@ -138,7 +142,7 @@ def set_stage(options: SimulationOptions) -> Stage:
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
     flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
-    sensors = (frame_times, antennas, islands)
+    sensors = (frame_times, antennas, segments)
     waving = _waving(camera, options)
     return Stage(options, scene, rig, story, *sensors, clutter, clutter_bias, bias, ghosts, flickers, waving)
 
@@ -170,16 +174,18 @@ def _other_rig(rig: Rig, options: SimulationOptions) -> Rig | None:
     return random_rig(child_rng(options, 23), camera=rig.camera, options=nominal)
 
 
-def _frame_times(rng: np.random.Generator, story: Story, islands: Islands, options: SimulationOptions) -> SensorTimes:
+def _frame_times(
+    rng: np.random.Generator, story: Story, segments: RecordedSegments, options: SimulationOptions
+) -> SensorTimes:
     rate_hz = options.camera_rate_hz
-    return draw_times(rng, story.duration_s, rate_hz, latency_s=0.0, transfer_s=0.022, islands=islands)
+    return draw_times(rng, story.duration_s, rate_hz, latency_s=0.0, transfer_s=0.022, segments=segments)
 
 
-def _islands(story: Story, options: SimulationOptions) -> Islands:
+def _segments(story: Story, options: SimulationOptions) -> RecordedSegments:
     if not options.islands:
         return EVERYTHING
     middles_s = np.array([resting.start_s + 0.5 * options.dwell_s for resting in story.restings])
-    return draw_islands(child_rng(options, 16), middles_s)
+    return draw_segments(child_rng(options, 16), middles_s)
 
 
 def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, options: SimulationOptions) -> Points3:

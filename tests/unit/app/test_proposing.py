@@ -69,8 +69,8 @@ class Finding:
 def finding(monkeypatch: pytest.MonkeyPatch) -> Finding:
     fake = Finding()
     monkeypatch.setattr("cocalib.proposing.find_proposals", fake.find)
-    monkeypatch.setattr("cocalib.proposing.looks_of", fake.look)
-    monkeypatch.setattr("cocalib.proposing.with_look", fake.carry)
+    monkeypatch.setattr("cocalib.proposing.appearances_of", fake.look)
+    monkeypatch.setattr("cocalib.proposing.with_appearance", fake.carry)
     return fake
 
 
@@ -237,7 +237,7 @@ def test_a_click_shows_the_dwell_whose_candidate_is_nearer_when_two_reflectors_s
     def look(view: DwellView, frames: object, pixel_px: np.ndarray) -> None:
         looked_at.append(view)
 
-    monkeypatch.setattr(proposing, "look_of", look)
+    monkeypatch.setattr(proposing, "appearance_of", look)
     click = ReflectorClick(TimeNs(3 * NS_PER_S), "c", 48.0, 30.0)
     left_out = ReflectorClick(TimeNs(22 * NS_PER_S), "x", 49.0, 29.0, excluded=True)
     elsewhere = ReflectorClick(TimeNs(15 * NS_PER_S), "e", 49.0, 29.0)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate, calibrate_pairs
-from calib_core.estimation.beyond_the_fit import find_pivotal_pair
+from calib_core.estimation.alternative_poses import find_pivotal_pair
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate
 from calib_core.estimation.leave_one_out import noise_parts, predict_left_out, shrunk_scales

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.arrays import Values
 from calib_core.estimation import posterior_samples as samples
-from calib_core.estimation.beyond_the_fit import (
+from calib_core.estimation.alternative_poses import (
     PosteriorSummary,
     find_agreeing_outliers,
     possible_poses,

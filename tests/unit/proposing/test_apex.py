@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from calib_core.proposing.apex import Apex, NoApex, find_apex
-from tests.unit.proposing.trihedral import Look, background, draw_look, noisy_image
+from tests.unit.proposing.trihedral import Appearance, background, draw_look, noisy_image
 
 _SIDE = (200, 200)
 
 
-def _look(width_px: float = 60.0) -> tuple[Look, np.ndarray, np.random.Generator]:
+def _look(width_px: float = 60.0) -> tuple[Appearance, np.ndarray, np.random.Generator]:
     """A well-lit reflector in front of a quiet background."""
     rng = np.random.default_rng(5)
     look = replace(

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from calib_core.errors import CalibrationError
 from calib_core.proposing import DwellView, ViewProgress, dwell_views
+from calib_core.proposing.appearance import Appearance, appearance_of, with_appearance
 from calib_core.proposing.dwell_views import averaged_over_dwell, reflector_width_px
 from calib_core.proposing.image_candidates import ImageCandidate
-from calib_core.proposing.look import Look, look_of, with_look
 from calib_core.proposing.still_images import frames_within, stack_median
 from tests.unit.proposing.drawn_dwells import CAMERA, DrawnDwell, DrawnFrames, placements_of
 
@@ -216,8 +216,8 @@ def views() -> tuple[DwellView, ...]:
     return dwell_views(placements_of(LOOKED_AT.dwells), LOOKED_AT, CAMERA)
 
 
-def look_at(view: DwellView, pixel_px: tuple[float, float]) -> Look:
-    look = look_of(view, LOOKED_AT, np.array(pixel_px))
+def look_at(view: DwellView, pixel_px: tuple[float, float]) -> Appearance:
+    look = appearance_of(view, LOOKED_AT, np.array(pixel_px))
     assert look is not None
     return look
 
@@ -232,7 +232,7 @@ def rough(view: DwellView, apex_px: tuple[float, float]) -> DwellView:
 def test_the_look_is_found_at_every_range_and_below_a_pixel(views):
     look = look_at(views[0], LOOKED_AT.dwells[0].apex_px)
     blobs = [rough(view, dwell.apex_px) for view, dwell in zip(views, LOOKED_AT.dwells, strict=True)]
-    for view, dwell in zip(with_look(blobs, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
+    for view, dwell in zip(with_appearance(blobs, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
         best = view.candidates[0]
         assert np.hypot(*(best.pixel_px - dwell.apex_px)) < 1.0
         assert best.likeness > 0.6
@@ -245,27 +245,27 @@ def test_a_click_shows_how_wide_the_reflector_is(thought_m):
     look = look_at(seen[0], LOOKED_AT.dwells[0].apex_px)
     assert look.larger * thought_m == pytest.approx(0.24, rel=0.4)
     assert look.larger == 1.0 or thought_m != 0.24
-    for view, dwell in zip(with_look(seen, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
+    for view, dwell in zip(with_appearance(seen, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
         assert np.hypot(*(view.candidates[0].pixel_px - dwell.apex_px)) < 1.0
 
 
 def test_a_click_beside_the_apex_is_carried_as_it_is(views):
     low_px = 0.3
     clicked = np.array(LOOKED_AT.dwells[0].apex_px) + np.array([0.0, low_px * views[0].width_px])
-    look = look_of(views[0], LOOKED_AT, clicked)
+    look = appearance_of(views[0], LOOKED_AT, clicked)
     assert not look.at_apex
-    view = with_look([rough(views[1], LOOKED_AT.dwells[1].apex_px)], [look], LOOKED_AT, CAMERA)[0]
+    view = with_appearance([rough(views[1], LOOKED_AT.dwells[1].apex_px)], [look], LOOKED_AT, CAMERA)[0]
     wanted = np.array(LOOKED_AT.dwells[1].apex_px) + np.array([0.0, low_px * view.width_px])
     assert np.hypot(*(view.candidates[0].pixel_px - wanted)) < 1.5
 
 
 def test_without_a_look_nothing_changes(views):
-    assert with_look(views, [], LOOKED_AT, CAMERA) == views
+    assert with_appearance(views, [], LOOKED_AT, CAMERA) == views
 
 
 def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views):
     broken = replace(LOOKED_AT, broken=frozenset(views[0].frames.tolist()))
-    assert look_of(views[0], broken, np.array(LOOKED_AT.dwells[0].apex_px)) is None
+    assert appearance_of(views[0], broken, np.array(LOOKED_AT.dwells[0].apex_px)) is None
 
 
 # The median of a few images against NumPy's.

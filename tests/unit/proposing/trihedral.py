@@ -15,7 +15,7 @@ _SHAPES = ("triangles", "squares", "quarters")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Appearance:
     """How a reflector is seen.
 
     Attributes:
@@ -43,7 +43,7 @@ class Look:
     gain: float
 
 
-def draw_look(rng: np.random.Generator, *, size_px: tuple[int, int], width_px: float | None = None) -> Look:
+def draw_look(rng: np.random.Generator, *, size_px: tuple[int, int], width_px: float | None = None) -> Appearance:
     """Draw how a reflector may be seen.
 
     Args:
@@ -53,7 +53,7 @@ def draw_look(rng: np.random.Generator, *, size_px: tuple[int, int], width_px: f
     """
     width = float(np.exp(rng.uniform(np.log(10.0), np.log(200.0)))) if width_px is None else width_px
     levels = rng.permutation([0.15, 0.4, 0.8] * rng.uniform(0.75, 1.25, 3))
-    return Look(
+    return Appearance(
         width_px=width,
         apex_px=0.5 * np.array(size_px) + rng.uniform(-2.0, 2.0, 2),
         reflector_from_camera=_axes(rng),
@@ -84,7 +84,7 @@ def _axes(rng: np.random.Generator) -> np.ndarray:
     return axes if np.linalg.det(axes) > 0.0 else axes[[1, 0, 2]]
 
 
-def noisy_image(look: Look, behind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def noisy_image(look: Appearance, behind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return the image as grey levels (h, w) uint8.
 
     Args:
@@ -115,7 +115,7 @@ def noisy_image(look: Look, behind: np.ndarray, rng: np.random.Generator) -> np.
     )
 
 
-def _traced(look: Look, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _traced(look: Appearance, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the light on the sheets and where they are hit, for pixel offsets from the apex."""
     focal, distance = 1000.0, 1000.0 / look.width_px
     edge = 0.75 if look.shape == "triangles" else 0.62  # the outline is then about one unit wide

@@ -28,13 +28,13 @@ _FINDING = "Looking for what moves"
 _log = logging.getLogger(__name__)
 
 
-class BoxDesk:
+class BoxService:
     """Takes boxes and tells all pages what they say. Runs on the event loop; finds, reads and computes in a thread."""
 
     def __init__(
         self, workspace: Workspace, recording: Recording, executor: Executor, tell: Callable[[Outgoing, str], None]
     ) -> None:
-        """Set up the desk.
+        """Set up the service.
 
         Args:
             workspace: has the calibration.

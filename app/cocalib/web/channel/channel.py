@@ -21,11 +21,11 @@ from cocalib.session.state import Session
 from cocalib.solving.solving import window_candidates
 from cocalib.view.candidates import PairCandidates, click_candidates, pair_of_click
 from cocalib.view.wording import sentence
-from cocalib.web.channel.desk import answer_of
 from cocalib.web.channel.hub import Hub
+from cocalib.web.channel.opening_service import opening_answers
 from cocalib.web.channel.outbox import NewestWins, Outbox, Shown
 from cocalib.web.channel.radar_survey import placements_at
-from cocalib.web.channel.review import ReviewDesk
+from cocalib.web.channel.review import ReviewService
 from cocalib.web.channel.space_feed import SpaceFeed
 from cocalib.web.frames import Frame, FrameStore
 from cocalib.web.messages.incoming import (
@@ -76,7 +76,7 @@ class Channel:
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
-        self._review = ReviewDesk(hub.workspace, hub.recording, lambda: hub.camera, self.outbox, self._report)
+        self._review = ReviewService(hub.workspace, hub.recording, lambda: hub.camera, self.outbox, self._report)
         self._space_feed = SpaceFeed(hub)
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
@@ -155,7 +155,7 @@ class Channel:
             if incoming.request is not None:
                 self.outbox.put(encode(Done(incoming.request)))
             return
-        for text in await answer_of(self._hub.desk, incoming):
+        for text in await opening_answers(self._hub.opening_service, incoming):
             self.outbox.put(text)
 
     async def _obey(self, command: Command) -> None:

@@ -16,13 +16,13 @@ from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
 from cocalib.view.model import View, warning_row
-from cocalib.web.channel.boxes import BoxDesk
-from cocalib.web.channel.desk import ClosedDesk, Desk
+from cocalib.web.channel.boxes import BoxService
 from cocalib.web.channel.image_changes import ImageChanges, changes_of
-from cocalib.web.channel.lens import LensDesk
+from cocalib.web.channel.lens import LensService
 from cocalib.web.channel.live_edge import LiveEdge
+from cocalib.web.channel.opening_service import NoOpening, OpeningService
 from cocalib.web.channel.outbox import Outbox, ViewFeed
-from cocalib.web.channel.proposing import ProposingDesk
+from cocalib.web.channel.proposing import ProposingService
 from cocalib.web.channel.radar_survey import Survey, survey_of
 from cocalib.web.frames import FrameStore
 from cocalib.web.messages.outgoing import (
@@ -67,11 +67,11 @@ class Hub:
         recording: Recording,
         executor: Executor,
         *,
-        desk: Desk | None = None,
+        opening_service: OpeningService | None = None,
         opening: int = 1,
         proposes: bool = False,
     ) -> None:
-        self.desk: Desk = desk or ClosedDesk()
+        self.opening_service: OpeningService = opening_service or NoOpening()
         self._opening = opening
         self.workspace = workspace
         self.recording = recording
@@ -84,9 +84,9 @@ class Hub:
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
-        self.boxes = BoxDesk(workspace, recording, executor, self.broadcast)
-        self.lens = LensDesk(workspace, recording, self.broadcast)
-        self.proposing = ProposingDesk(workspace, recording, self.broadcast, on=proposes)
+        self.boxes = BoxService(workspace, recording, executor, self.broadcast)
+        self.lens = LensService(workspace, recording, self.broadcast)
+        self.proposing = ProposingService(workspace, recording, self.broadcast, on=proposes)
         self._searching: asyncio.Task[None] | None = None
         self._edge = (
             LiveEdge(self, workspace, recording, workspace.camera) if isinstance(recording, FollowedRecording) else None

@@ -45,11 +45,11 @@ _MOST_RESIDUALS = 3000
 _GRID = (24, 16)
 
 
-class LensDesk:
+class LensService:
     """Calibrates the lens for the pages of a recording. Runs on the event loop, except where it says otherwise."""
 
     def __init__(self, workspace: Workspace, recording: Recording, tell: Callable[[Outgoing, str], None]) -> None:
-        """Set up the desk.
+        """Set up the service.
 
         Args:
             workspace: has the intrinsics in use.

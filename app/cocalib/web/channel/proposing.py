@@ -44,13 +44,13 @@ _NO_RADAR = (
 _log = logging.getLogger(__name__)
 
 
-class ProposingDesk:
+class ProposingService:
     """Proposes for all pages of a recording. Runs on the event loop, except where it says otherwise."""
 
     def __init__(
         self, workspace: Workspace, recording: Recording, tell: Callable[[Outgoing, str], None], *, on: bool
     ) -> None:
-        """Set up the desk.
+        """Set up the service.
 
         Args:
             workspace: has the clicks, the options and the intrinsics.

@@ -57,7 +57,7 @@ _LABELS: dict[SolutionKind, str] = {
 }
 
 
-class ReviewDesk:
+class ReviewService:
     """Answers the reviews of one page. Runs on the event loop; the answers are computed in a thread."""
 
     def __init__(

@@ -18,12 +18,12 @@ from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.frames import Frame
 from cocalib.web.messages.incoming import CursorMoved
-from cocalib.web.messages.space_messages import SpaceLook
+from cocalib.web.messages.space_messages import SpaceFrame
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of
 from cocalib.web.view3d.returns import Colouring
 from cocalib.web.view3d.scene import TabScene
-from cocalib.web.view3d.sight import Sight, space_look
+from cocalib.web.view3d.sight import Sight, space_frame
 
 _PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
 """Minimum time between two drawings while playing, with and without images: the 3D view shares the page's main thread, and the
@@ -46,7 +46,7 @@ class SpaceFeed:
         self._surveyed: Survey | None = None
         self._extent = UNKNOWN
 
-    async def draw(self, cursor: CursorMoved, scene: TabScene) -> SpaceLook | None:
+    async def draw(self, cursor: CursorMoved, scene: TabScene) -> SpaceFrame | None:
         """Draw a frame; return what the page draws over it, None if nothing was drawn.
 
         While playing, it is drawn once a second, or thrice without images; the frame at which the page stops is always drawn.
@@ -152,9 +152,9 @@ def surveyed_extent(survey: Survey, returns: Returns) -> Extent:
     return extent_of(points, weights, reflectors)
 
 
-def _drawn(scene: TabScene, sight: Sight) -> SpaceLook:
+def _drawn(scene: TabScene, sight: Sight) -> SpaceFrame:
     scene.show(sight)
-    return space_look(sight)
+    return space_frame(sight)
 
 
 def _ends_db(survey: Survey | None, returns: Returns) -> tuple[float, float] | None:

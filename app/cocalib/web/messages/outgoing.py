@@ -21,7 +21,7 @@ from cocalib.view.model import ClickRow, View, WarningRow
 from cocalib.view.review import Compared, PairReview, Review
 from cocalib.web.messages.lens_messages import LensResult, LensState
 from cocalib.web.messages.opening_messages import FolderListing, OpeningChoices
-from cocalib.web.messages.space_messages import Placements, RadarLook, RadarMap, RadarReturn, SpaceLook
+from cocalib.web.messages.space_messages import Placements, RadarFrame, RadarMap, RadarReturn, SpaceFrame
 
 _VIEW_FIELDS = tuple(field.name for field in fields(View) if field.name != "clicks")
 _ROW_FIELDS = tuple(field.name for field in fields(ClickRow))
@@ -395,9 +395,9 @@ Outgoing: TypeAlias = (
     | FramesAdded
     | FollowNote
     | Placements
-    | RadarLook
+    | RadarFrame
     | RadarMap
-    | SpaceLook
+    | SpaceFrame
     | Overlay
     | AccPanel
     | PairCandidates
@@ -424,9 +424,9 @@ TYPES: Mapping[type, str] = {
     FramesAdded: "frames_added",
     FollowNote: "following",
     Placements: "placements",
-    RadarLook: "radar_look",
+    RadarFrame: "radar_look",
     RadarMap: "radar_map",
-    SpaceLook: "space",
+    SpaceFrame: "space",
     Overlay: "overlay",
     AccPanel: "acc",
     PairCandidates: "candidates",

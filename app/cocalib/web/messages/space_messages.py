@@ -121,7 +121,7 @@ class SpaceLegend:
 
 
 @dataclass(frozen=True, slots=True)
-class SpaceLook:
+class SpaceFrame:
     """What the 3D view shows, for the layer that the page draws over it.
 
     Attributes:
@@ -198,7 +198,7 @@ class Placements:
 
 
 @dataclass(frozen=True, slots=True)
-class RadarLook:
+class RadarFrame:
     """The returns of the last seconds, for a recording without images.
 
     Attributes:

@@ -28,7 +28,7 @@ from cocalib.solving.solving import calibration_text
 from cocalib.view.wording import sentence
 from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
 from cocalib.web.channel.image_changes import ImageChanges
-from cocalib.web.channel.lens import LensDesk
+from cocalib.web.channel.lens import LensService
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.exports import FieldError, format_rows, image_of
@@ -88,7 +88,7 @@ class Surveyor(Protocol):
         ...
 
     @property
-    def lens(self) -> LensDesk:
+    def lens(self) -> LensService:
         """The lens of whoever calibrates one."""
         ...
 

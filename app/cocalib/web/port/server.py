@@ -16,8 +16,8 @@ from calib_core.recordings import EncodedImage, Recording
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import site_folder, static_folder
 from cocalib.web.channel.channel import Channel, Socket
-from cocalib.web.channel.desk import Desk
 from cocalib.web.channel.hub import Hub
+from cocalib.web.channel.opening_service import OpeningService
 from cocalib.web.messages.opening_messages import OpeningChoices
 from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port import guard
@@ -42,9 +42,9 @@ _log = logging.getLogger(__name__)
 class RunningServer:
     """A running server; `close` stops it. Pages can connect at once; they wait until a recording is admitted."""
 
-    def __init__(self, link: Link, room: WaitingRoom, desk: Desk | None = None) -> None:
+    def __init__(self, link: Link, room: WaitingRoom, opening_service: OpeningService | None = None) -> None:
         options, self._link = link.options, link
-        self._desk = desk
+        self._opening_service = opening_service
         self._executor = _frame_threads()
         self._openings = 0
         self._pages: set[ServerConnection] = set()
@@ -80,7 +80,7 @@ class RunningServer:
             workspace,
             recording,
             self._executor,
-            desk=self._desk,
+            opening_service=self._opening_service,
             opening=self._openings,
             proposes=self._link.options.proposes,
         )
@@ -102,7 +102,7 @@ class RunningServer:
         async def turn_out() -> None:
             self._hub = None
             self._routes.withdraw()
-            self._room = WaitingRoom(opening, self._desk)
+            self._room = WaitingRoom(opening, self._opening_service)
             await hub.end()
             await asyncio.gather(*(page.close(_AGAIN, "another recording is being opened") for page in [*self._pages]))
 

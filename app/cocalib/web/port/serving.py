@@ -14,7 +14,7 @@ from typing import Protocol, Self
 from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage, Recording
 from cocalib.view.wording import sentence
-from cocalib.web.channel.desk import Desk
+from cocalib.web.channel.opening_service import OpeningService
 from cocalib.web.messages.opening_messages import OpeningChoices
 from cocalib.web.messages.outgoing import Opening
 from cocalib.web.port.link import Link, ServerOptions
@@ -27,7 +27,7 @@ _WAIT_S = 0.25
 _log = logging.getLogger(__name__)
 
 
-class ChoosingDesk(Desk, Protocol):
+class ChoosingService(OpeningService, Protocol):
     """Answers what pages ask about the choice of a recording; `chosen` is set once a page has chosen."""
 
     chosen: threading.Event
@@ -46,7 +46,7 @@ class Service:
         first_image: Callable[[], EncodedImage | None],
         *,
         let_in_after_s: float,
-        desk: ChoosingDesk | None = None,
+        opening_service: ChoosingService | None = None,
     ) -> None:
         """Set up the service; nothing is served yet.
 
@@ -56,14 +56,14 @@ class Service:
             first_image: reads the image for waiting pages, in its own thread; returns None if there is none to show early.
             let_in_after_s: delay before waiting pages are admitted [s]; with 0, the link is printed before anything is opened,
                 so that opening the recording and starting the browser do not slow each other down.
-            desk: answers what pages ask about the choice of a recording; without, the recording is kept.
+            opening_service: answers what pages ask about the choice of a recording; without, the recording is kept.
         """
         self._link = Link(link) if isinstance(link, ServerOptions) else link
         self._opening = opening
         self._first_image = first_image
         self._let_in_after_s = let_in_after_s
-        self._desk = desk
-        self._chosen = threading.Event() if desk is None else desk.chosen
+        self._opening_service = opening_service
+        self._chosen = threading.Event() if opening_service is None else opening_service.chosen
         self._server: RunningServer | None = None
         self._is_settled = threading.Event()
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="early")
@@ -136,7 +136,7 @@ class Service:
         """Return the server, started now if that was not needed earlier."""
         self._is_settled.set()
         if self._server is None:
-            self._server = self._early.result() or self._start(WaitingRoom(desk=self._desk))
+            self._server = self._early.result() or self._start(WaitingRoom(opening_service=self._opening_service))
         return self._server
 
     def _end(self, error: BaseException | None) -> None:
@@ -155,13 +155,13 @@ class Service:
             return None
         image = self._threads.submit(self._first_image)
         print(self._opening.doing, flush=True)
-        server = self._start(WaitingRoom(self._opening, self._desk))
+        server = self._start(WaitingRoom(self._opening, self._opening_service))
         image.add_done_callback(lambda done: _show(server, done))
         return server
 
     def _start(self, room: WaitingRoom) -> RunningServer:
         """Start the server and print its link."""
-        server = RunningServer(self._link, room, self._desk)
+        server = RunningServer(self._link, room, self._opening_service)
         self._link.announce()
         return server
 

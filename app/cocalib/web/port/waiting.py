@@ -12,7 +12,7 @@ from calib_core.recordings import EncodedImage
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.view.wording import sentence
 from cocalib.web.channel.channel import Socket
-from cocalib.web.channel.desk import ClosedDesk, Desk, answer_of
+from cocalib.web.channel.opening_service import NoOpening, OpeningService, opening_answers
 from cocalib.web.messages.incoming import is_about_opening, parse, request_of
 from cocalib.web.messages.opening_messages import OpeningChoices, OpeningCommand
 from cocalib.web.messages.outgoing import FrameHeader, Opening, Problem, encode, encode_frame
@@ -28,8 +28,8 @@ _REFUSAL_TIMEOUT_S = 3.0
 class WaitingRoom:
     """Sends to every waiting page, once and in order: what is being done, the first image, the end. Runs on the event loop."""
 
-    def __init__(self, opening: Opening | None = None, desk: Desk | None = None) -> None:
-        self._desk: Desk = desk or ClosedDesk()
+    def __init__(self, opening: Opening | None = None, opening_service: OpeningService | None = None) -> None:
+        self._opening_service: OpeningService = opening_service or NoOpening()
         self._first = 0
         self._opening = opening
         self._news: list[str | bytes] = [] if opening is None else [encode(opening)]
@@ -125,7 +125,7 @@ class WaitingRoom:
             incoming = parse(text)
             if not isinstance(incoming.command, OpeningCommand):
                 return None
-            return await answer_of(self._desk, incoming)
+            return await opening_answers(self._opening_service, incoming)
         except CalibrationError as error:
             if not is_about_opening(text):
                 return None

@@ -17,8 +17,8 @@ from cocalib.web.frames import Frame
 from cocalib.web.messages.space_messages import (
     PlacementState,
     RadarMap,
+    SpaceFrame,
     SpaceLabel,
-    SpaceLook,
     SpacePlacement,
     SpaceReflector,
     SpaceReturn,
@@ -111,12 +111,12 @@ _MOST_RETURNS = 3000
 _MOST_IN_WINDOW = 1000
 
 
-def space_look(sight: Sight) -> SpaceLook:
+def space_frame(sight: Sight) -> SpaceFrame:
     """Describe a Sight for the page."""
     calibration = sight.calibration
     solved = sight.session.outcome
     pairs = solved.pairs if isinstance(solved, Calibration) else ()
-    return SpaceLook(
+    return SpaceFrame(
         number=sight.number,
         index=sight.index,
         returns=_seen(sight, sight.returns.thinned(_MOST_RETURNS)),

@@ -15,7 +15,7 @@ from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.making import subject_of
 from cocalib.report.residual_rows import ResidualRows
-from cocalib.report.subject import Against, Image, Judged, ReportSubject, Watched
+from cocalib.report.subject import Against, Image, RecordingEvidence, ReportSubject, Watched
 
 SIZE_PX = (640, 480)
 _N = 60
@@ -130,5 +130,5 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
     compared = compare(subject_for(project_root, moved).found, subject.found)
     against = Against("other.json", (FILE,), compared, (long,) * 4)
-    judged = Judged(Evaluation(None, replace(box_figures(), rule=long)))
+    judged = RecordingEvidence(Evaluation(None, replace(box_figures(), rule=long)))
     return replace(subject, recording=seen, judged=judged, against=against, inputs=(FILE,))

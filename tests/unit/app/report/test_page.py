@@ -21,7 +21,7 @@ from calib_core.results.verdict import stated_error
 from cocalib.report.making import known_calibration, subject_of
 from cocalib.report.page import report_html
 from cocalib.report.sections.acceptance import limits_met
-from cocalib.report.subject import Against, Judged, ReportSubject
+from cocalib.report.subject import Against, RecordingEvidence, ReportSubject
 from cocalib.view.wording import plain
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
@@ -37,7 +37,7 @@ def subject(project_root: Path) -> ReportSubject:
 @pytest.fixture
 def full(subject: ReportSubject) -> ReportSubject:
     """A calibration judged on a recording."""
-    return replace(subject, recording=watched_recording(), judged=Judged(Evaluation(None, box_figures())))
+    return replace(subject, recording=watched_recording(), judged=RecordingEvidence(Evaluation(None, box_figures())))
 
 
 def _parsed(subject: ReportSubject) -> ElementTree.Element:
@@ -170,7 +170,7 @@ def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(full):
     ):
         assert said in words
     none = replace(box_figures(), acc=None, acc_without_zero_frames=None, chance=None, frames=(), classes=(), ranges=())
-    words = _words(replace(full, judged=Judged(Evaluation(None, none))))
+    words = _words(replace(full, judged=RecordingEvidence(Evaluation(None, none))))
     assert "Acc is unknown" in words
 
 

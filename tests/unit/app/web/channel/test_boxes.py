@@ -13,7 +13,7 @@ from calib_core.boxes import boxes_text
 from calib_core.errors import InputError
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from cocalib.view.acc_panel import AccPanel
-from cocalib.web.channel.boxes import BoxDesk
+from cocalib.web.channel.boxes import BoxService
 from cocalib.web.messages.incoming import BoxesWanted, MovingBoxesWanted
 from cocalib.web.messages.outgoing import Outgoing, Progress
 from cocalib.workspace import Workspace, open_workspace
@@ -53,7 +53,7 @@ def at_desk(
     told: list[Outgoing] = []
 
     async def run() -> None:
-        desk = BoxDesk(workspace, walk, threads, lambda message, _kind: told.append(message))
+        desk = BoxService(workspace, walk, threads, lambda message, _kind: told.append(message))
         desk.follow()
         for command in commands:
             before = len(told)
@@ -143,6 +143,6 @@ def test_a_page_that_opens_later_gets_the_figures(workspace, walk, threads):
         def put(self, text: str, *, kind: str) -> None:
             told.append((kind, json.loads(text)))
 
-    BoxDesk(workspace, walk, threads, lambda *_: None).greet(Page())
+    BoxService(workspace, walk, threads, lambda *_: None).greet(Page())
     [(kind, panel)] = told
     assert (kind, panel["type"], panel["source"], panel["figures"]) == ("acc", "acc", "", [])

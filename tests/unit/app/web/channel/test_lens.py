@@ -20,7 +20,7 @@ from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.results import DataWarning
 from cocalib.session.events import Undo
 from cocalib.session.state import RecordingFacts
-from cocalib.web.channel.lens import LensDesk, camera_table, lens_result, view_corners
+from cocalib.web.channel.lens import LensService, camera_table, lens_result, view_corners
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages.incoming import parse
 from cocalib.web.messages.lens_messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse
@@ -58,9 +58,9 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cocalib.intrinsics.job.calibrate_from", calibrate)
 
 
-def at_desk(workspace: Workspace, visit: Callable[[LensDesk, list[Outgoing]], Any]) -> list[Outgoing]:
+def at_desk(workspace: Workspace, visit: Callable[[LensService, list[Outgoing]], Any]) -> list[Outgoing]:
     """Run a visit at a desk; return what the pages were told."""
-    return visited(lambda tell: LensDesk(workspace, Frames(), tell), visit)
+    return visited(lambda tell: LensService(workspace, Frames(), tell), visit)
 
 
 async def until_done(told: list[Outgoing]) -> LensState:
@@ -72,7 +72,7 @@ async def until_done(told: list[Outgoing]) -> LensState:
 
 @pytest.mark.usefixtures("found")
 def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
-    async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
+    async def visit(desk: LensService, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match="no calibrated lens"):
             await desk.use(LensUse())
         with pytest.raises(InputError, match="calibrate the lens first"):
@@ -111,7 +111,7 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
     ],
 )
 def test_a_board_that_cannot_be_is_refused_in_words(workspace, wanted, said):
-    async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
+    async def visit(desk: LensService, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match=said):
             desk.calibrate(wanted)
         desk.cancel(LensCancel())

@@ -14,7 +14,7 @@ from calib_core.measurements import TimeNs
 from calib_core.proposing import ViewProgress
 from cocalib.session.events import PlacementDismissed
 from cocalib.session.state import RecordingFacts
-from cocalib.web.channel.proposing import ProposingDesk
+from cocalib.web.channel.proposing import ProposingService
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
 from cocalib.web.messages.outgoing import ProposalNews
 from cocalib.workspace import Workspace
@@ -64,10 +64,14 @@ class Cameras(Sensors):
 
 
 def at_desk(
-    workspace: Workspace, visit: Callable[[ProposingDesk, list[Any]], Any], recording: object = None, *, on: bool = True
+    workspace: Workspace,
+    visit: Callable[[ProposingService, list[Any]], Any],
+    recording: object = None,
+    *,
+    on: bool = True,
 ) -> list[Any]:
     """Run a visit at a desk; return what the pages were told."""
-    return visited(lambda tell: ProposingDesk(workspace, recording or Sensors(), tell, on=on), visit)
+    return visited(lambda tell: ProposingService(workspace, recording or Sensors(), tell, on=on), visit)
 
 
 async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> ProposalNews:
@@ -79,7 +83,7 @@ async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> Propo
 
 
 def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace):
-    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+    async def visit(desk: ProposingService, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
         news = await until(told, lambda one: one.progress.stage == "ready")
         assert (news.on, news.progress.problem) == (True, "")
@@ -105,7 +109,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeyp
     monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, None))
     time = views[1].image_time
 
-    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+    async def visit(desk: ProposingService, told: list[Any]) -> None:
         early = await desk.averaged(SnapWanted(time, (31.0, 25.0), over_dwell=True))
         assert (early.pixel_px, "not looked at" in early.words) == (None, True)
         desk.surveyed(PLACEMENTS)
@@ -125,7 +129,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeyp
 
 
 def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(workspace):
-    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+    async def visit(desk: ProposingService, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
         desk.switch(ProposingSwitch(on=True))
         await until(told, lambda one: one.progress.stage == "ready" and bool(one.rows))
@@ -137,7 +141,7 @@ def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(wo
 
 
 def test_without_radar_scans_it_says_so(workspace):
-    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+    async def visit(desk: ProposingService, told: list[Any]) -> None:
         desk.surveyed(())
         desk.switch(ProposingSwitch(on=True))
         news = await until(told, lambda one: one.progress.stage == "failed")

@@ -16,7 +16,7 @@ from calib_core.results import Calibration
 from cocalib.session.applying import History
 from cocalib.session.state import Session
 from cocalib.web.channel.outbox import Outbox
-from cocalib.web.channel.review import ReviewDesk
+from cocalib.web.channel.review import ReviewService
 from cocalib.web.messages.incoming import CompareWanted, ReviewRequest, ReviewWanted, UncertaintyWanted
 
 
@@ -41,7 +41,7 @@ def answers(session: Session, *requests: ReviewRequest, camera: Any = None) -> l
 
     async def ask() -> list[Any]:
         outbox, sent, reports = Outbox(), [], []
-        desk = ReviewDesk(Desk(session), Desk(session), lambda: camera, outbox, reports.append)
+        desk = ReviewService(Desk(session), Desk(session), lambda: camera, outbox, reports.append)
 
         async def take(message: str | bytes) -> None:
             sent.append(json.loads(message))

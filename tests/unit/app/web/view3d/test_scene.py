@@ -36,7 +36,7 @@ from cocalib.web.view3d.shapes import (
     rays_to,
     vertical_field_of_view_rad,
 )
-from cocalib.web.view3d.sight import Sight, space_look
+from cocalib.web.view3d.sight import Sight, space_frame
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 FACTS = RecordingFacts("made", np.arange(4, dtype=np.int64) * 1000, 640, 480)
@@ -215,7 +215,7 @@ def test_in_the_light_theme_nothing_is_white_on_white(drawn):
 def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn):
     drawn.scene.show(sight(index=312))
     assert drawn.node("/shown").position == pytest.approx((312, 313, 0))
-    assert space_look(sight(index=312)).number == 313
+    assert space_frame(sight(index=312)).number == 313
 
 
 @pytest.mark.parametrize("viewpoint", ["behind", "above", "side"])
@@ -255,18 +255,18 @@ def test_a_placement_is_open_clicked_or_dismissed():
     dismissed = replace(seen.session, dismissed=(DismissedPlacement(TimeNs(9100), (9.0, 0.0, 0.0)),))
     states = replace(seen, session=dismissed).placement_states()
     assert states == ("clicked", "open", "clicked", "dismissed")
-    assert [one.state for one in space_look(seen).placements] == list(seen.placement_states())
+    assert [one.state for one in space_frame(seen).placements] == list(seen.placement_states())
 
 
 def test_what_can_be_picked_is_where_the_lens_shows_it():
     solved = calibration()
-    look = space_look(sight(solved, selected="c2"))
+    look = space_frame(sight(solved, selected="c2"))
     assert look.projected
     pixels = solved.camera.project(solved.camera_from_radar @ np.array([[4.0, 0.0, 0.0]]))
     assert (look.returns[0].seen.u_px, look.returns[0].seen.v_px) == pytest.approx(pixels[0], abs=0.01)
     assert [one.id for one in look.reflectors] == ["c1", "c2", "c3", "c4"]
     assert [label.kind for label in look.labels] == ["selected"]
-    before = space_look(sight())
+    before = space_frame(sight())
     assert not before.projected
     assert np.isnan(before.returns[0].seen.u_px)
     assert before.rings_m[-1] >= UNKNOWN.range_m

@@ -327,7 +327,7 @@ NARROW_CONDITION = 5e5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BeyondTheFit:
+class PoseAlternatives:
     """What the fit and its covariance do not show.
 
     Attributes:
@@ -345,15 +345,15 @@ class BeyondTheFit:
     agreeing: AgreeingOutliers | None = None
 
 
-def look_beyond(
+def find_alternatives(
     measurements: PairMeasurements,
     refined: ErrorsInVariablesFit,
     uncertainty: PoseCovariance,
     others: Sequence[GncSolution],
     *,
     seed: int,
-) -> BeyondTheFit:
-    """Sample the posterior, and look for the pair that all rests on and for outliers that agree.
+) -> PoseAlternatives:
+    """Sample the posterior, and find the pivotal pair and outliers that agree.
 
     The posterior is that of the pose at the fitted systematic errors; what these add to the covariance is added to each sample.
 
@@ -366,7 +366,7 @@ def look_beyond(
     """
     rng = np.random.default_rng(seed)
     corrected = measurements.with_errors(refined.measurements.errors.values)
-    beyond = BeyondTheFit(
+    beyond = PoseAlternatives(
         refined,
         uncertainty,
         pivotal=find_pivotal_pair(corrected, refined),

@@ -40,7 +40,7 @@ _CARRIED_PX, _CARRIED = 0.5, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Appearance:
     """What the reflector looks like around the pixel that a person confirmed.
 
     Attributes:
@@ -63,7 +63,7 @@ class Look:
         freeze(self, offset_px=(2,))
 
 
-def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | None:
+def appearance_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Appearance | None:
     """Take the look of the reflector at a confirmed pixel; None if no frame of the dwell can be read.
 
     Args:
@@ -85,11 +85,11 @@ def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | N
     middle = np.round(at_px)
     side = 2 * max(4, int(np.ceil(_HALF * width_px)) + 2) + 1
     patch = cv2.getRectSubPix(image, (side, side), (float(middle[0]), float(middle[1])))
-    return Look(patch, at_px - middle, width_px, sigma_px, at_apex, width_px / view.width_px)
+    return Appearance(patch, at_px - middle, width_px, sigma_px, at_apex, width_px / view.width_px)
 
 
-def with_look(
-    views: Sequence[DwellView], looks: Sequence[Look], frames: FrameSource, camera: Camera
+def with_appearance(
+    views: Sequence[DwellView], looks: Sequence[Appearance], frames: FrameSource, camera: Camera
 ) -> tuple[DwellView, ...]:
     """Find the look again near the candidates of each view, the most alike first.
 
@@ -104,7 +104,7 @@ def with_look(
     return tuple(_looked_at(view, looks, frames, camera) for view in views)
 
 
-def likeness_elsewhere(look: Look, views: Sequence[DwellView], frames: FrameSource, camera: Camera) -> float:
+def likeness_elsewhere(look: Appearance, views: Sequence[DwellView], frames: FrameSource, camera: Camera) -> float:
     """Return how alike the more similar half of dwells shows the thing, at the sizes that follow from their ranges.
 
     Args:
@@ -113,14 +113,14 @@ def likeness_elsewhere(look: Look, views: Sequence[DwellView], frames: FrameSour
         frames: of the camera.
         camera: its intrinsics.
     """
-    found = with_look([view for view in views if view.candidates], [look], frames, camera)
+    found = with_appearance([view for view in views if view.candidates], [look], frames, camera)
     likeness = sorted(
         (max((candidate.likeness for candidate in view.candidates), default=0.0) for view in found), reverse=True
     )
     return float(np.mean(likeness[: (len(likeness) + 1) // 2])) if likeness else 0.0
 
 
-def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, camera: Camera) -> DwellView:
+def _looked_at(view: DwellView, looks: Sequence[Appearance], frames: FrameSource, camera: Camera) -> DwellView:
     """Compare all candidates roughly, and refine those most alike; of another width than thought, they are found again."""
     larger = float(np.median([look.larger for look in looks]))
     if larger != 1.0 and view.change.size:
@@ -160,7 +160,7 @@ def _with_surroundings(view: DwellView, frames: FrameSource) -> list[ImageCandid
     ]
 
 
-def _unlike_in_size(look: Look, width_px: float) -> float:
+def _unlike_in_size(look: Appearance, width_px: float) -> float:
     """Return how badly a look suits a size: a larger one shows more than a smaller one."""
     ratio = float(np.log(look.width_px / width_px))
     return ratio if ratio >= 0.0 else -2.0 * ratio
@@ -172,17 +172,17 @@ class _Match:
 
     pixel_px: Vector2
     likeness: float
-    look: Look
+    look: Appearance
 
 
 def _best_match(
-    candidate: ImageCandidate, looks: Sequence[Look], width_px: float, at_width_px: float, finer: float
+    candidate: ImageCandidate, looks: Sequence[Appearance], width_px: float, at_width_px: float, finer: float
 ) -> _Match:
     fine = min(finer, at_width_px / width_px)
     return max((_match(candidate, look, width_px, fine) for look in looks), key=lambda match: match.likeness)
 
 
-def _match(candidate: ImageCandidate, look: Look, width_px: float, fine: float) -> _Match:
+def _match(candidate: ImageCandidate, look: Appearance, width_px: float, fine: float) -> _Match:
     """Correlate a look with the surroundings of a candidate, at the scale of its range and `fine` times finer."""
     import cv2
 
@@ -216,7 +216,7 @@ def _moved(candidate: ImageCandidate, match: _Match, width_px: float) -> ImageCa
     return replace(candidate, pixel_px=match.pixel_px, sigma_px=sigma_px, likeness=likeness, has_apex=False)
 
 
-def _template(look: Look, width_px: float) -> tuple[np.ndarray, np.ndarray]:
+def _template(look: Appearance, width_px: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the look at another size, its confirmed pixel in the middle, and the disc that is compared: float32."""
     import cv2
 

@@ -9,7 +9,7 @@ from cocalib.web.messages.opening_messages import OpeningCommand
 from cocalib.web.messages.outgoing import Done, Outgoing, encode
 
 
-class Desk(Protocol):
+class OpeningService(Protocol):
     """Answers what pages ask about the choice of a recording."""
 
     def answer(self, command: OpeningCommand) -> Outgoing | None:
@@ -21,7 +21,7 @@ class Desk(Protocol):
         ...
 
 
-class ClosedDesk:
+class NoOpening:
     """Answers for a server that was started with one recording and keeps it."""
 
     def answer(self, command: OpeningCommand) -> Outgoing | None:
@@ -29,7 +29,7 @@ class ClosedDesk:
         raise InputError("this server keeps its recording; start cocalib open to choose another one")
 
 
-async def answer_of(desk: Desk, incoming: Incoming) -> list[str]:
+async def opening_answers(opening_service: OpeningService, incoming: Incoming) -> list[str]:
     """Return the texts that answer a message about the choice of a recording.
 
     Raises:
@@ -37,7 +37,7 @@ async def answer_of(desk: Desk, incoming: Incoming) -> list[str]:
     """
     assert isinstance(incoming.command, OpeningCommand)
     try:
-        answer = await asyncio.get_running_loop().run_in_executor(None, desk.answer, incoming.command)
+        answer = await asyncio.get_running_loop().run_in_executor(None, opening_service.answer, incoming.command)
     except OSError as error:
         raise InputError(f"{error.filename or 'a file'}: {error.strerror or error}") from error
     texts = [] if answer is None else [encode(answer)]
