@@ -10,6 +10,7 @@ from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.radar.column_guess import forward_axis
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.merging import MergedStream
@@ -252,7 +253,17 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
                 "choose the radar with --radar-topic, or add the file that contains it",
             )
         )
-    height = radar.sample(_SAMPLED_SCANS).points_radar_m[:, 2]
+    points = radar.sample(_SAMPLED_SCANS).points_radar_m
+    if layout.plan.axes is None and forward_axis(*points[:, :2].T) == "y":
+        warnings.append(
+            DataWarning.reported(
+                "radar-looks-left",
+                f"{name}: y is never negative and x has both signs: y seems to point forward and x to the right",
+                "if so, read it with --radar-axes right,forward,up; if the radar looks to the left of the vehicle, its returns "
+                "are in the vehicle's frame, and its own is needed",
+            )
+        )
+    height = points[:, 2]
     height = height[np.isfinite(height)]
     if len(height) > 1 and np.all(height == height[0]):
         warnings.append(

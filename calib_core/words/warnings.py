@@ -679,11 +679,17 @@ def radar_axes_suspected(*, side: str, behind: int, pairs: int) -> Remark:
     Could also be: axes that differ by less than 60 deg: the pose absorbs any rotation.
     """
     where = "behind the radar" if side == "behind" else f"to the {side} of the radar"
+    axes = {"left": "right,forward,up", "right": "left,backward,up"}.get(side, "backward,right,up")
     return remark(
         f"the placements are {where}, and {behind} of {pairs} radar positions have x below 0: their frame seems not to be the "
         "radar's",
-        "radar axes must be x forward, y left, z up, with the origin at the radar; the pose is right for the given axes, but a "
-        "camera position, and the noise of the angles, refer to the radar's own",
+        say(
+            "radar axes must be x forward, y left, z up, with the origin at the radar; if they are turned, read them with "
+            "{axes}; the pose is right for the given axes, but a camera position, and the noise of the angles, refer to the "
+            "radar's own",
+            axes=option("radar_axes", axes),
+        ),
+        SetOption("radar_axes", axes),
     )
 
 

@@ -1,8 +1,10 @@
 """Files in the forms that other people's tools write, made of the sample's own returns: their truth is known."""
 
 import json
+import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -84,3 +86,35 @@ def test_a_radar_whose_clock_is_another_time_scale_is_named_and_can_be_corrected
     assert answer.code == 0
     assert "--radar-late -37" in answer.err
     assert error_of(out, sample) < (0.15, 1.5)
+
+
+def test_a_cloud_with_y_forward_is_named_with_the_axes_to_type(cocalib, cases, sample, tmp_path):
+    bags, axes = (cases / "12-y-forward-cloud" / "radar.bag", sample / "camera.bag"), "right,forward,up"
+    answer = cocalib("info", *bags)
+    assert "radar-looks-left" in answer.out
+    assert f"--radar-axes {axes}" in answer.out
+    assert "radar-looks-left" not in cocalib("info", *bags, "--radar-axes", axes).out
+    assert "radar-looks-left" not in cocalib("info", sample / "radar.bag", sample / "camera.bag").out
+    solve = ("solve", *bags, "--clicks", sample / "clicks.json", "--out", tmp_path / "c.json")
+    assert f"--radar-axes {axes}" in cocalib(*solve).out
+    assert cocalib(*solve, "--radar-axes", axes).code == 0
+    assert error_of(tmp_path / "c.json", sample) < (0.15, 1.5)
+
+
+def test_a_camera_matrix_times_a_pose_is_named(cocalib, cases):
+    case = cases / "40-projection-times-pose"
+    answer = cocalib("import", case / "calib_camera_radar.txt", "--camera", case / "camera.yaml")
+    assert answer.code == 2
+    assert "inverse(K)" in answer.err
+
+
+def test_a_folder_of_calibrations_beside_images_gives_their_intrinsics(cocalib, cases, tmp_path):
+    folder = shutil.copytree(cases / "47-folder-with-calib" / "set", tmp_path / "set")
+    images = folder / "image"
+    images.mkdir()
+    blank = cv2.imencode(".jpg", np.zeros((600, 960, 3), np.uint8))[1].tobytes()
+    for file in (folder / "radar").glob("*.csv"):
+        (images / f"{file.stem}.jpg").write_bytes(blank)
+    summary = json.loads(cocalib("info", "--json", folder).out)
+    assert summary["camera"]["matrix_px"][0][0] == pytest.approx(798.85, abs=0.01)
+    assert summary["radar"]["scans"] == 40

@@ -344,7 +344,8 @@ def _with_scale(fault: str, matrix: np.ndarray) -> str:
     if "orthonormal" not in fault:
         return fault
     if largest > 50:
-        return f"{fault}: it looks like a projection, with the camera matrix multiplied into it; give R and t alone"
+        what = "it looks like a projection K [R | t], with the camera matrix multiplied into it"
+        return f"{fault}: {what}; give R and t alone: inverse(K) times it"
     return f"{fault}: is it scaled, or rounded to too few digits?"
 
 

@@ -61,10 +61,11 @@ def _element(element: Element, depth: int = 0) -> Any:
 
 
 def _rows(lines: tuple[str, ...]) -> Any:
-    """Return lines of numbers as their rows; None if something else is among them."""
+    """Return lines of numbers as their rows, without a line of names above them; None if something else is among them."""
     if len(lines) > _MOST_ROWS:
         return None
     rows = [_text_numbers(line.partition("#")[0]) for line in lines]
+    rows = rows[1:] if len(rows) > 1 and rows[0] is None and not re.search(r"\d", lines[0]) else rows
     return None if any(row is None for row in rows) else rows
 
 

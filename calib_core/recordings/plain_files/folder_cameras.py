@@ -19,6 +19,7 @@ _MAX_BYTES = 1 << 29
 _LEVELS = 4
 _SUFFIXES = (".jpg", ".jpeg", ".png")
 _CAMERA_NUMBER = re.compile(r"image_?0?(\d)")
+_ONLY_CAMERA = ("camera_intrinsic", "camera_projection_matrix", "P")
 _RAW_KITTI = "calib_cam_to_cam.txt"
 
 
@@ -114,10 +115,11 @@ def _number_of(folder: Path) -> str | None:
 
 
 def _of_kitti_frames(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
-    """Read calib/NUMBER.txt beside image_2: one file per frame, or one for all."""
+    """Read calib/NUMBER.txt beside image_2, or beside images of the only camera: one file per frame, or one for all."""
     number = _number_of(folder)
+    keys = _ONLY_CAMERA if number is None else (f"P{number}",)
     beside = folder.parent / "calib"
-    if number is None or not files:
+    if not files:
         return None
     candidates = [beside / f"{file.stem}.txt" for file in (files[0], files[len(files) // 2], files[-1])]
     paths = [path for path in candidates if path.is_file()]
@@ -125,13 +127,15 @@ def _of_kitti_frames(folder: Path, files: Sequence[Path]) -> FolderCamera | None
         paths = sorted(beside.glob("*.txt"))[:1] or [path for path in (folder.parent / "calib.txt",) if path.is_file()]
     if not paths:
         return None
-    matrices = [lines[f"P{number}"].reshape(3, 4)[:, :3] for path in paths if f"P{number}" in (lines := _lines(path))]
+    found = [next((lines[key] for key in keys if key in lines), None) for lines in map(_lines, paths)]
+    matrices = [numbers.reshape(3, -1)[:, :3] for numbers in found if numbers is not None]
     if not matrices:
         return None
     doubt = ""
     if any(np.abs(matrix - matrices[0]).max() > 0.5 for matrix in matrices):
         doubt = "the files of other frames have other intrinsics; those of the first frame are used"
-    pose = f"its pose: --calibration {paths[0]}" if "Tr_velo_to_cam" in _lines(paths[0]) else ""
+    posed = any(key == "Tr_velo_to_cam" or "radar" in key.lower() for key in _lines(paths[0]))
+    pose = f"its pose: --calibration {paths[0]}" if posed else ""
     return FolderCamera(paths[0], matrices[0], np.zeros(0), None, pose, doubt)
 
 
