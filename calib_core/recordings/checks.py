@@ -254,7 +254,7 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
             )
         )
     points = radar.sample(_SAMPLED_SCANS).points_radar_m
-    if layout.plan.axes is None and forward_axis(*points[:, :2].T) == "y":
+    if not layout.lidar_like and layout.plan.axes is None and forward_axis(*points[:, :2].T) == "y":
         warnings.append(
             DataWarning.reported(
                 "radar-looks-left",
