@@ -13,6 +13,7 @@ from calib_core.options import option
 from calib_core.recordings.box_topics import BoxLayout, box_layout
 from calib_core.recordings.camera.images import ImageLayout, is_image
 from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
+from calib_core.recordings.field_words import meaning_of
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_plan import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
@@ -131,9 +132,9 @@ def _radar_usage(topic: Topic, definition: Definition, payload: bytes, stated: S
         if not stated.column_map:
             raise
         if recognise(definition, payload, more) is None:
-            return _no_radar(definition)
+            return _no_radar(definition, topic.name)
         return Usage("radar", problem=str(error))
-    return _no_radar(definition) if radar is None else Usage("radar", radar=radar)
+    return _no_radar(definition, topic.name) if radar is None else Usage("radar", radar=radar)
 
 
 def _readable(topic: Topic, rows: Sequence[int]) -> Iterator[bytes]:
@@ -143,7 +144,7 @@ def _readable(topic: Topic, rows: Sequence[int]) -> Iterator[bytes]:
             yield topic.payload(row)
 
 
-def _no_radar(definition: Definition) -> Usage:
+def _no_radar(definition: Definition, topic: str) -> Usage:
     """Say why a message that might be a radar's is not read."""
     if _holds_packets(definition):
         return Usage("other", problem=_RAW)
@@ -152,12 +153,19 @@ def _no_radar(definition: Definition) -> Usage:
     for place in struct_lists(definition):
         names, _ = leaf_names(definition, place.element)
         if len(names) > 2 and place.element.partition("/")[0] not in _ROS_PACKAGES:
-            shown = ", ".join(names[:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
-            return Usage("other", problem=(
-                f"not read as a radar: its list '{place.name}' has structs with the fields {shown}, and no position and speed or "
-                "amplitude is recognised among them; if it is one, say which is which, such as --map x=FIELD:m --map y=FIELD:m"
-            ))  # fmt: skip
+            return _unrecognised(f"its list '{place.name}' has structs with the fields", names)
+    names, _ = leaf_names(definition, definition.type)
+    if "radar" in f"{topic}{definition.type}".lower() and any(map(meaning_of, names)):
+        return _unrecognised("it has the fields", names)
     return Usage("other")
+
+
+def _unrecognised(what: str, names: Sequence[str]) -> Usage:
+    shown = ", ".join(names[:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
+    return Usage("other", problem=(
+        f"not read as a radar: {what} {shown}, and no position and speed or amplitude is recognised among them; if it is "
+        "one, say which is which, such as --map x=FIELD:m --map y=FIELD:m"
+    ))  # fmt: skip
 
 
 def _holds_packets(definition: Definition) -> bool:

@@ -118,3 +118,9 @@ def test_a_folder_of_calibrations_beside_images_gives_their_intrinsics(cocalib, 
     summary = json.loads(cocalib("info", "--json", folder).out)
     assert summary["camera"]["matrix_px"][0][0] == pytest.approx(798.85, abs=0.01)
     assert summary["radar"]["scans"] == 40
+
+
+@pytest.mark.parametrize(("name", "words"), [("idl", "--map"), ("pb", "protobuf"), ("flat", "flatbuffer")])
+def test_a_radar_topic_that_is_not_read_has_its_reason(cocalib, cases, name, words):
+    (topic,) = json.loads(cocalib("info", "--json", cases / "34-foxglove-schemas" / f"{name}.mcap").out)["topics"]
+    assert words in topic["problem"]
