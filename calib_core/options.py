@@ -88,6 +88,12 @@ class RadarOptions:
     elevation_scale_sigma: float = option(
         0.03, "Standard deviation of the elevation's scale, as a share (0.03 is 3 %).", low=0.0, high=0.5
     )
+    elevation_lean_sigma: float = option(
+        0.01,
+        "Standard deviation of how far elevations lean with the azimuth [rad per rad]: a rolled or sheared antenna array.",
+        low=0.0,
+        high=0.5,
+    )
     range_bias_sigma_m: float = option(0.03, "Standard deviation of a constant range error [m].", low=0.0, high=5.0)
     range_scale_sigma: float = option(0.003, "Standard deviation of the range's scale, as a share.", low=0.0, high=0.5)
     azimuth_bias_sigma_deg: float = option(

@@ -96,6 +96,7 @@ export interface NoiseOptions {
 export interface RadarOptions {
   azimuth_scale_sigma: number;
   elevation_scale_sigma: number;
+  elevation_lean_sigma: number;
   range_bias_sigma_m: number;
   range_scale_sigma: number;
   azimuth_bias_sigma_deg: number;

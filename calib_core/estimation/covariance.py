@@ -331,17 +331,14 @@ _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
 _INDEPENDENT_LOG_ODDS = 4.5  # prior log-odds of purely independent errors against each single split
-_CLEARLY_INDEPENDENT = 0.7  # probability of purely independent errors
 _NEGLIGIBLE = 1e-10
 
 
 def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.ndarray | None:
     """Return the covariance (6 + k, 6 + k) of the least-squares pose and systematic errors under smooth angle errors.
 
-    None if the residuals do not show them.
-
-    Every split of the noise into independent and smooth parts is weighted by its probability: a few dozen pairs determine
-    the size of the smooth part only roughly, so the covariance must not rely on a single estimate of it.
+    None if there are too few pairs. Every split of the noise into independent and smooth parts is weighted by its probability:
+    what the pose absorbs of a smooth error no residual shows, so quiet residuals must not rule it out.
 
     Args:
         refined: the fit.
@@ -364,8 +361,6 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
         middles.append(parts[:, 0] * (jacobian.T @ jacobian) + parts[:, 1] * (shared.T @ shared))
     probability = np.exp(np.concatenate(likelihoods) - np.concatenate(likelihoods).max())
     probability /= probability.sum()
-    if probability[0] > _CLEARLY_INDEPENDENT:
-        return None
     middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
     return np.asarray(inverse @ middle @ inverse)

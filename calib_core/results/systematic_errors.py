@@ -90,6 +90,15 @@ def scale(name: str, sigma: float, coordinate: int) -> SystematicError:
     return SystematicError(name, sigma, column)
 
 
+def elevation_lean(sigma: float) -> SystematicError:
+    """Return an elevation that leans with the azimuth; half of it is an exact roll of the radar, which the pose absorbs."""
+
+    def column(at: Sensitivity) -> np.ndarray:
+        return np.asarray(at.d_polar[..., 2, :, :] * -at.polar[1])
+
+    return SystematicError("elevation_lean", sigma, column)
+
+
 def range_bias(sigma_m: float) -> SystematicError:
     """Return a constant error of the range."""
 
@@ -348,6 +357,8 @@ def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool
         *(click_offset(row, name, _click_sigma_px(options, camera, lens)) for row, name in enumerate(_AXES[:2])),
         *_default_lens(options, camera, lens),
     ]
+    if not flat:
+        widening.append(elevation_lean(options.radar.elevation_lean_sigma))
     (estimated if taped else widening).extend(reflector)
     if lens is not None:
         (estimated if options.refining.intrinsics else widening).extend(_lens(lens))

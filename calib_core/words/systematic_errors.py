@@ -95,6 +95,13 @@ ERRORS: Mapping[str, ErrorWords] = {
         "%",
         _by(_HEIGHTS, SpreadPlacements("heights")),
     ),
+    "elevation_lean": ErrorWords(
+        "elevation lean",
+        "radar elevations that lean with the azimuth",
+        _by(f"{_HEIGHTS},", SpreadPlacements("heights")),
+        100.0,
+        "%",
+    ),
     "squared_height_m2": ErrorWords(
         "height, squared",
         "the height of the placements",

@@ -32,6 +32,7 @@ const LABELS = {
   "radar.azimuth_scale_sigma": "Azimuth scale (0.02 = 2 %)",
   "radar.elevation_scale_sigma": "Elevation scale (0.03 = 3 %)",
   "radar.range_bias_sigma_m": "Range bias",
+  "radar.elevation_lean_sigma": "Elevation lean",
   "radar.range_scale_sigma": "Range scale",
   "radar.azimuth_bias_sigma_deg": "Azimuth bias",
   "radar.elevation_bias_sigma_deg": "Elevation bias",

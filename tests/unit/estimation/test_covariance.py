@@ -83,7 +83,7 @@ def test_a_known_noise_level_takes_the_chi_square_quantile():
 _SIGMA_M = 1.0
 _STEP = 0.02
 """Share of a sigma by which each error is changed: the pose follows in proportion."""
-_RADAR = RadarOptions(range_scale_sigma=0.0)
+_RADAR = RadarOptions(range_scale_sigma=0.0, elevation_lean_sigma=0.0)
 
 
 def moved_by(pairs: Sequence[Pair], change: Callable[[np.ndarray], np.ndarray]) -> tuple[Pair, ...]:

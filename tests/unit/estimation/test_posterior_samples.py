@@ -15,6 +15,7 @@ from calib_core.estimation.alternative_poses import (
     possible_poses,
     summarize_posterior,
 )
+from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
 from calib_core.estimation.posterior_samples import (
     Mixture,
@@ -63,7 +64,8 @@ def test_a_nearly_normal_posterior_has_the_local_mean_and_covariance(estimate_sc
     solved = solve_draw(simulated, tape=True, estimate_scale=estimate_scale)
     drawn = sampled(solved)
     summary = summarized(solved, drawn)
-    root = np.linalg.cholesky(solved.uncertainty.covariance)
+    independent = pose_covariance(solved.refined, smooth=False)  # the samples know no smooth errors
+    root = np.linalg.cholesky(independent.covariance)
     whitened = np.linalg.solve(root, np.linalg.solve(root, summary.covariance).T)
     moved = np.linalg.solve(root, summary.camera_from_radar.error_from(solved.refined.camera_from_radar))
     assert drawn.samples.effective > 500.0

@@ -164,6 +164,8 @@ def pixels_with(
         reported = RadarErrors.named({error.name: amount}).corrected_polar(reported)
     elif error.name == "range_scale":
         reported = reported / np.array([[1.0 + amount], [1.0], [1.0]])
+    elif error.name == "elevation_lean":
+        reported = reported - amount * np.stack([np.zeros_like(reported[1]), np.zeros_like(reported[1]), reported[1]])
     elif error.axis is not None:
         offset_m[error.axis] = amount
     elif error.name.startswith("click"):
