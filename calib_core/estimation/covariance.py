@@ -330,7 +330,7 @@ _INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
 _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
-_INDEPENDENT_LOG_ODDS = 4.5  # prior log-odds of purely independent errors against each single split
+_INDEPENDENT_LOG_ODDS = 3.0  # prior log-odds of purely independent errors against each single split
 _NEGLIGIBLE = 1e-10
 
 

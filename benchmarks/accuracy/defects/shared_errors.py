@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -15,6 +15,7 @@ from benchmarks.accuracy.outcomes import outcome_figures
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from benchmarks.simulated_pairs import (
     FIELD,
+    NOISE_PROFILES,
     NoiseName,
     SimulatedPairs,
     SystematicErrors,
@@ -22,7 +23,9 @@ from benchmarks.simulated_pairs import (
     simulate_pairs,
 )
 from calib_core.calibration import calibrate_pairs
-from calib_core.options import CalibrationOptions
+from calib_core.measurements import Candidate
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.synthetic.scene.scenes import PairsLayout
 
 __all__ = [
@@ -57,12 +60,15 @@ class Shared:
     aisle: bool = False
     errors: bool = True
     """Whether the errors that all pairs share are drawn; otherwise the instruments are exact."""
+    smooth_share: float = 0.0
+    """Share of the variance of the radar's angles that neighbouring directions have in common; the sum is as stated."""
 
     @property
     def key(self) -> str:
         """A file name."""
         place, known = "aisle" if self.aisle else "field", "free" if self.tape_m is None else "tape"
-        return f"{place}-{self.noise}-{self.pairs}-{self.outlier_share:.0%}-{known}".replace("%", "pc")
+        smooth = f"-smooth-{self.smooth_share:.0%}" if self.smooth_share else ""
+        return f"{place}-{self.noise}-{self.pairs}-{self.outlier_share:.0%}-{known}{smooth}".replace("%", "pc")
 
 
 _FIELD_CASES = tuple(Shared(noise, pairs, tape_m) for tape_m, noise, pairs in product((0.01, None), _NOISES, _COUNTS))
@@ -74,14 +80,49 @@ _CLEAN = tuple(Shared(one.noise, one.pairs, one.tape_m, errors=False) for one in
 def draw_shared(case: Shared, trial: int) -> SimulatedPairs:
     """Draw one trial; with and without shared errors it has the same rig, placements and noise."""
     errors = draw_systematic_errors(np.random.default_rng([2031, trial])) if case.errors else SystematicErrors()
-    return simulate_pairs(
+    rng, noise = np.random.default_rng([2030, trial]), NOISE_PROFILES[case.noise]
+    left = (1.0 - case.smooth_share) ** 0.5
+    independent = replace(
+        noise,
+        sigma_azimuth_deg=left * noise.sigma_azimuth_deg,
+        sigma_elevation_deg=left * noise.sigma_elevation_deg,
+    )
+    simulated = simulate_pairs(
         case.pairs,
-        rng=np.random.default_rng([2030, trial]),
-        noise=case.noise,
+        rng=rng,
+        noise=independent,
         outlier_share=case.outlier_share,
         layout=_FREE_AISLE if case.aisle else FIELD,
         systematic=errors,
     )
+    return with_smooth_errors(simulated, rng, noise, case.smooth_share) if case.smooth_share else simulated
+
+
+_LENGTHS_DEG = (10.0, 40.0)
+
+
+def with_smooth_errors(
+    simulated: SimulatedPairs, rng: np.random.Generator, noise: NoiseOptions, share: float
+) -> SimulatedPairs:
+    """Add to all candidates angle errors that are a Gaussian process over direction, with this share of the stated variance."""
+    directions = polar_from_cartesian(simulated.points_radar_m)[:, 1:]
+    length = np.deg2rad(rng.uniform(*_LENGTHS_DEG))
+    apart = ((directions[:, None] - directions[None]) ** 2).sum(axis=2)
+    root = np.linalg.cholesky(np.exp(-0.5 * apart / length**2) + 1e-8 * np.eye(len(directions)))
+    sigma_polar = sigma_polar_of(noise)
+    off = share**0.5 * sigma_polar * (root @ rng.standard_normal((len(directions), 3)))
+    off[:, 0] = 0.0
+
+    def moved(candidate: Candidate, by: np.ndarray) -> Candidate:
+        position = cartesian_from_polar(polar_from_cartesian(candidate.position_radar_m[None]) + by)
+        (covariance,) = covariance_from_sigma_polar(position, sigma_polar[None])
+        return replace(candidate, position_radar_m=position[0], sigma_polar=sigma_polar, covariance_m2=covariance)
+
+    pairs = tuple(
+        replace(pair, candidates=tuple(moved(candidate, by) for candidate in pair.candidates))
+        for pair, by in zip(simulated.pairs, off, strict=True)
+    )
+    return replace(simulated, pairs=pairs)
 
 
 def measure_shared(case: Shared, trial: int) -> Figures:
