@@ -19,6 +19,7 @@ from calib_core.recordings.checks import (
     about_images,
     about_lost,
     about_radar,
+    about_radar_frame,
     check_overlap,
     without_certain_zone,
 )
@@ -142,6 +143,8 @@ def assemble(
     warnings.extend(
         [*about_camera, *about_radar(radar), *_about_claims(radar), *about_images(images), *about_video(images)]
     )
+    radar_frame = _frame(used.radars[0]) if used.radars else ""
+    warnings.extend(about_radar_frame(used.radars[0].name, radar_frame) if used.radars else [])
     assumptions = without_certain_zone(_assumptions(sources, used, radar), radar, images)
     unconfirmed = () if options.confirm_assumptions else assumptions
     warnings.extend(about_assumptions(unconfirmed))
@@ -153,7 +156,7 @@ def assemble(
         image_choice=image_choice(inventory, selection.image, options.image_topic),
         image_topic=used.image.name if used.image else None,
         camera_info_topic=used.camera_info.name if used.camera_info else str(beside.file) if beside else None,
-        radar_frame=_frame(used.radars[0]) if used.radars else "",
+        radar_frame=radar_frame,
         camera_frame=_frame(used.image) or _frame(used.camera_info),
         radar=radar,
         images=images,

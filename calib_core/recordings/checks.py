@@ -22,6 +22,9 @@ _FEW = 5
 _MIN_ANGLE_RAD = 0.02
 _MIRROR = "--radar-axes forward,right,up"
 _SAMPLED_SCANS = 12
+_VEHICLE_FRAMES = frozenset(
+    {"base_link", "base_footprint", "base", "body", "car", "chassis", "ego", "ego_vehicle", "rear_axle", "vehicle"}
+)
 _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
 _HOURS_S = range(-14 * 3600, 14 * 3600 + 1, 3600)
 
@@ -274,6 +277,26 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
             )
         )
     return warnings
+
+
+def about_radar_frame(name: str, frame: str) -> list[DataWarning]:
+    """Warn if a radar's frame has the name of a vehicle's: its noise, scales and biases are polar about the radar.
+
+    Args:
+        name: of the topic.
+        frame: its frame_id.
+    """
+    if frame.lower().rpartition("/")[2] not in _VEHICLE_FRAMES:
+        return []
+    return [
+        DataWarning.reported(
+            "radar-in-vehicle-frame",
+            f"{name} is in the frame '{frame}', by its name a vehicle's: the pose would be that of this frame, and its "
+            "uncertainty is too small, since the radar's noise and angle errors are about the radar's own place and axes",
+            "record the returns in the radar's own frame, before the driver or converter moves them; if they are in it and only "
+            "the name is wrong, no action is needed",
+        )
+    ]
 
 
 def about_images(images: ImageStream | None) -> list[DataWarning]:

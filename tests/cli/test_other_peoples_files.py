@@ -124,3 +124,10 @@ def test_a_folder_of_calibrations_beside_images_gives_their_intrinsics(cocalib, 
 def test_a_radar_topic_that_is_not_read_has_its_reason(cocalib, cases, name, words):
     (topic,) = json.loads(cocalib("info", "--json", cases / "34-foxglove-schemas" / f"{name}.mcap").out)["topics"]
     assert words in topic["problem"]
+
+
+def test_returns_that_a_driver_has_moved_into_the_vehicles_frame_are_named(cocalib, cases, sample, tmp_path):
+    bags = (cases / "16-returns-in-base-link" / "radar.bag", sample / "camera.bag")
+    assert "radar-in-vehicle-frame" in cocalib("info", *bags).out
+    answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", tmp_path / "c.json")
+    assert "'base_link'" in answer.err

@@ -140,15 +140,19 @@ def recorded_clicks(
     return frames.clicks
 
 
+_OF_FRAMES = ("radar-in-vehicle-frame", "radar-looks-left")
+
+
 def tell_choices(recording: "Recording") -> None:
-    """Print to stderr which radar and which camera are used and why, where there are several, and what is damaged."""
+    """Print to stderr which radar and which camera are used and why, where there are several, and what is wrong with them."""
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
     from calib_core.words.warnings import told
 
     _tell_notes(recording.radar_clock_notes)
-    _tell_notes([str(told(warning).message) for warning in recording.damage])
+    doubted = [warning for warning in recording.warnings if warning.code in _OF_FRAMES]
+    _tell_notes([str(told(warning).message) for warning in (*doubted, *recording.damage)])
 
 
 def _tell_notes(notes: Sequence[str]) -> None:
