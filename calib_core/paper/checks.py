@@ -20,7 +20,9 @@ from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import DataWarning
 
 _MISFIT = 13.816  # squared standard deviations, two degrees of freedom: 1 of 1,000
-_CONTRADICTED = 4.0
+_CONTRADICTED = (
+    4.0  # chi2 per degree of freedom: at most 1.8 in 181 right poses, at least 39 in 101 wrong ones (docs/paper.md)
+)
 _FAR_CAMERA = 3.0  # expected distances
 _TRUSTED_ROTATION_RAD = np.deg2rad(1.0)  # an error of a method that states no uncertainty is not expected to be larger
 _TRUSTED_POSITION_M = 0.25
