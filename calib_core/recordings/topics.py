@@ -174,7 +174,7 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
         topic, rows = wanted[0]
         index = MessageIndex(topic.receive_ns[rows], topic.chunk[rows], topic.offset[rows])
         return [topic.parts[0][0].heads(index, size, keep=keep)]
-    headses = [
+    header_columns = [
         Heads(np.zeros((len(rows), size), dtype=np.uint8), np.zeros(len(rows), dtype=np.int64)) for _, rows in wanted
     ]
     places: dict[int, list[tuple[int, np.ndarray]]] = {}
@@ -194,10 +194,10 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
         heads = sources[key].heads(index, size, keep=keep)
         edges = np.cumsum([0, *map(len, picked)])
         for (number, mine), first, last in zip(shares, edges[:-1], edges[1:], strict=True):
-            headses[number].rows[mine] = heads.rows[first:last]
-            headses[number].lengths[mine] = heads.lengths[first:last]
-            headses[number] = replace(headses[number], fault=headses[number].fault or heads.fault)
-    return headses
+            header_columns[number].rows[mine] = heads.rows[first:last]
+            header_columns[number].lengths[mine] = heads.lengths[first:last]
+            header_columns[number] = replace(header_columns[number], fault=header_columns[number].fault or heads.fault)
+    return header_columns
 
 
 def join_topics(
@@ -292,9 +292,9 @@ def read_stamps(topics: Sequence[tuple[Topic, int]]) -> tuple[StampedTopic, ...]
         topics: each with the number of bytes to keep of each message; the stamp takes 12.
     """
     size = max((wanted for _, wanted in topics), default=0)
-    headses = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size, keep=True)
+    header_columns = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size, keep=True)
     stamped = []
-    for (topic, wanted), heads in zip(topics, headses, strict=True):
+    for (topic, wanted), heads in zip(topics, header_columns, strict=True):
         readable = heads.lengths >= 0
         kept = topic if readable.all() else topic.take(np.flatnonzero(readable))
         rows = heads.rows[readable]
