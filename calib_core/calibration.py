@@ -317,7 +317,7 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
         quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
             solution = _Solution.local(quick, task.options, smooth=False)
-            described = _described(task, groups, measurements, solution)
+            described = _calibration_of(task, groups, measurements, solution)
             first = flat_radar(quick, solution.uncertainty, task.options.radar)
             yield _preview(described, previous or replace(described, warnings=tuple(first)))
     yield _answer(task, groups, measurements)
@@ -349,7 +349,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed
     )
     solution = replace(solution, refined=alternatives.refined, uncertainty=alternatives.uncertainty)
-    calibration = _described(task, groups, measurements, solution)
+    calibration = _calibration_of(task, groups, measurements, solution)
     metrics = calibration.metrics
     solved_fit = SolvedFit(
         ids=tuple(pair.id for pair in used),
@@ -404,7 +404,7 @@ class _Solution:
         return cls(refined, uncertainty, left_out)
 
 
-def _described(
+def _calibration_of(
     task: _Task, groups: Sequence[PlacementGroup], measurements: PairMeasurements, solution: _Solution
 ) -> Calibration:
     """Return the solution as a calibration, without warnings and advice."""

@@ -104,7 +104,7 @@ def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TIL
     scale = width_px / frame.image.shape[1]
     height_px = max(1, round(frame.image.shape[0] * scale))
     drawn = cv2.resize(frame.image, (width_px, height_px), interpolation=cv2.INTER_AREA)
-    for (u_px, v_px), range_m in _seen(frame, hypothesis):
+    for (u_px, v_px), range_m in _pixels_and_ranges(frame, hypothesis):
         nearness = float(np.clip(np.log(_FAR_M / range_m) / np.log(_FAR_M / _NEAR_M), 0.0, 1.0))
         at = round((u_px + 0.5) * scale), round((v_px + 0.5) * scale)
         radius = 3 + round(4 * nearness)
@@ -116,10 +116,10 @@ def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TIL
 
 def returns_in_image(frame: FrameWithReturns, hypothesis: "Hypothesis") -> str:
     """Return how many of the returns a hypothesis puts into the image."""
-    return f"{len(_seen(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the image"
+    return f"{len(_pixels_and_ranges(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the image"
 
 
-def _seen(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple[float, float], float]]:
+def _pixels_and_ranges(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple[float, float], float]]:
     """Return the pixel and the range of each return that is in the image."""
     if not len(frame.points_radar_m):
         return []

@@ -280,7 +280,7 @@ def draw_returns(image: np.ndarray, pixels_px: Points2, colours: np.ndarray, sti
     blue_first = colours[:, ::-1].tolist()
     for (u_px, v_px), colour, stays in zip(pixels_px.tolist(), blue_first, still.tolist(), strict=True):
         if stays:
-            centre = _fixed(u_px, v_px)
+            centre = _fixed_point(u_px, v_px)
             cv2.circle(image, centre, round((size + 1.2) * (1 << _SHIFT)), _EDGE, -1, smooth, _SHIFT)
             cv2.circle(image, centre, round(size * (1 << _SHIFT)), colour, -1, smooth, _SHIFT)
         else:
@@ -300,7 +300,7 @@ def _draw_trail(image: np.ndarray, pixels_px: Points2, colours: np.ndarray, ages
     radii = 0.3 * _text_height_px(image) * (1.0 - 0.75 * ages)
     rows = zip(pixels_px.tolist(), colours[:, ::-1].tolist(), radii.tolist(), strict=True)
     for (u_px, v_px), colour, radius_px in rows:
-        cv2.circle(image, _fixed(u_px, v_px), round(radius_px * (1 << _SHIFT)), colour, -1, cv2.LINE_8, _SHIFT)
+        cv2.circle(image, _fixed_point(u_px, v_px), round(radius_px * (1 << _SHIFT)), colour, -1, cv2.LINE_8, _SHIFT)
 
 
 def draw_clicks(image: np.ndarray, clicks_px: Points2, projected_px: Points2, ids: Sequence[str]) -> None:
@@ -312,12 +312,17 @@ def draw_clicks(image: np.ndarray, clicks_px: Points2, projected_px: Points2, id
     for click, projected, name, length_px, colour in rows:
         (u_px, v_px), seen = click, bool(np.isfinite(projected).all())
         for (left, top), (right, bottom) in (((-1, 0), (1, 0)), ((0, -1), (0, 1))):
-            ends = (_fixed(u_px + left * size, v_px + top * size), _fixed(u_px + right * size, v_px + bottom * size))
+            ends = (
+                _fixed_point(u_px + left * size, v_px + top * size),
+                _fixed_point(u_px + right * size, v_px + bottom * size),
+            )
             cv2.line(image, *ends, _EDGE, 3, cv2.LINE_AA, _SHIFT)
             cv2.line(image, *ends, _WHITE, 1, cv2.LINE_AA, _SHIFT)
         if seen:
-            cv2.line(image, _fixed(u_px, v_px), _fixed(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
-            cv2.circle(image, _fixed(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT)
+            cv2.line(image, _fixed_point(u_px, v_px), _fixed_point(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
+            cv2.circle(
+                image, _fixed_point(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT
+            )
         words = f"{name}: {length_px:.1f} px" if seen else f"{name}: behind the camera"
         width = _label_width_px(words, size)
         fits = u_px + 1.8 * size + width < image.shape[1]
@@ -329,7 +334,7 @@ def draw_boxes(image: np.ndarray, boxes: Sequence[Box], labels: Sequence[str]) -
     """Draw boxes with their classes and tracks, one colour per class."""
     for box in boxes:
         hue = _HUES[labels.index(box.label) % len(_HUES)][::-1] if box.label in labels else _WHITE
-        corners = (_fixed(box.left_px, box.top_px), _fixed(box.right_px, box.bottom_px))
+        corners = (_fixed_point(box.left_px, box.top_px), _fixed_point(box.right_px, box.bottom_px))
         cv2.rectangle(image, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
         cv2.rectangle(image, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
         words = box_words(box)
@@ -357,7 +362,7 @@ def label(
         plate: darken what is behind the line, so that it can be read on any image.
     """
     height_px = _text_height_px(image) if height_px is None else height_px
-    plain, scale, width = _measured(words, height_px)
+    plain, scale, width = _text_layout(words, height_px)
     u_px = min(max(place_px[0], 2.0), max(2.0, image.shape[1] - width - 2.0))
     v_px = min(max(place_px[1], 1.5 * height_px), image.shape[0] - 0.5 * height_px)
     if plate:
@@ -371,10 +376,10 @@ def label(
 
 def _label_width_px(words: str, height_px: float) -> float:
     """Return how wide a line is [px]."""
-    return _measured(words, height_px)[2]
+    return _text_layout(words, height_px)[2]
 
 
-def _measured(words: str, height_px: float) -> tuple[str, float, float]:
+def _text_layout(words: str, height_px: float) -> tuple[str, float, float]:
     """Return what can be written of a line, OpenCV's scale for letters of a height, and the width [px]."""
     plain = words.encode("ascii", "replace").decode()
     scale = height_px / cv2.getTextSize("H", _FONT, 1.0, 1)[0][1]
@@ -383,10 +388,10 @@ def _measured(words: str, height_px: float) -> tuple[str, float, float]:
 
 def _triangle(image: np.ndarray, u_px: float, v_px: float, size: float, colour: Sequence[int], smooth: int) -> None:
     corners = [(u_px, v_px - size), (u_px + 0.9 * size, v_px + 0.7 * size), (u_px - 0.9 * size, v_px + 0.7 * size)]
-    cv2.fillConvexPoly(image, np.array([_fixed(*corner) for corner in corners]), colour, smooth, _SHIFT)
+    cv2.fillConvexPoly(image, np.array([_fixed_point(*corner) for corner in corners]), colour, smooth, _SHIFT)
 
 
-def _fixed(u_px: float, v_px: float) -> tuple[int, int]:
+def _fixed_point(u_px: float, v_px: float) -> tuple[int, int]:
     """Return a place as OpenCV takes it, with fractions of a pixel."""
     return round(u_px * (1 << _SHIFT)), round(v_px * (1 << _SHIFT))
 

@@ -19,7 +19,7 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.appearance import Appearance, appearance_of, likeness_elsewhere, with_appearance
 from calib_core.proposing.dwell_views import has_changed
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
 
@@ -377,7 +377,7 @@ class ProposingJob:
             if not self._is_wanted(wish):
                 return
             if isinstance(found, Unsolvable):
-                said = outcome_told(found)
+                said = outcome_remark(found)
                 self._set(wish, Proposals(()), stage="failed", problem=str(said.message), hint=str(said.hint))
                 return
             self._seen, self._seen_for = found[0], wish

@@ -127,7 +127,7 @@ def too_near(position_radar_m: Sequence[float] | np.ndarray) -> str:
 def _check_click(pair: Pair) -> None:
     if not np.isfinite(pair.pixel_px).all():
         raise InputError(
-            f"pair {pair.id}: pixel {_listed(pair.pixel_px)} is not finite; click it again, or remove the pair"
+            f"pair {pair.id}: pixel {_name_list(pair.pixel_px)} is not finite; click it again, or remove the pair"
         )
     if pair.sigma_px is not None and not (np.isfinite(pair.sigma_px) and pair.sigma_px > 0.0):
         raise InputError(
@@ -139,16 +139,16 @@ def _check_click(pair: Pair) -> None:
 def _check_candidate(candidate: Candidate, name: str, *, with_noise: bool) -> None:
     position = candidate.position_radar_m
     if not np.isfinite(position).all():
-        raise InputError(f"pair {name}: radar position {_listed(position)} m is not finite; remove the pair")
+        raise InputError(f"pair {name}: radar position {_name_list(position)} m is not finite; remove the pair")
     if near := too_near(position):
-        raise InputError(f"pair {name}: radar position {_listed(position)} m {near}")
+        raise InputError(f"pair {name}: radar position {_name_list(position)} m {near}")
     sigma = candidate.sigma_polar
     if with_noise and not (np.isfinite(sigma).all() and (sigma > 0.0).all()):
         raise InputError(
-            f"pair {name}: sigma_polar is {_listed(sigma)}; the standard deviations of range [m], azimuth and elevation "
+            f"pair {name}: sigma_polar is {_name_list(sigma)}; the standard deviations of range [m], azimuth and elevation "
             "[rad] must be finite and above zero"
         )
 
 
-def _listed(values: np.ndarray) -> str:
+def _name_list(values: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in values.tolist()) + ")"

@@ -132,8 +132,8 @@ def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tup
         densest = int(np.argmax(np.where(mass > 0, neighbours @ mass, 0.0)))
         around = neighbours[densest] * mass
         centre = _mean_shifted(around @ cells / around.sum(), steps, np.where(free, amplitude, 0.0))
-        members = free & _near(steps, centre, _REACH)
-        mass = np.where(_near(cells, centre, _REACH), 0.0, mass)
+        members = free & _are_near(steps, centre, _REACH)
+        mass = np.where(_are_near(cells, centre, _REACH), 0.0, mass)
         mass[densest] = 0.0
         if members.any():
             free &= ~members
@@ -174,7 +174,7 @@ def cluster_at(window: RadarScans, position_radar_m: Vector3, *, scale: Vector3)
     """
     steps = direction_cosines(window.points_radar_m) / scale
     at = direction_cosines(position_radar_m[None])[0] / scale
-    members = _near(steps, at, _REACH) & (window.points_radar_m[:, 0] * position_radar_m[0] >= 0)
+    members = _are_near(steps, at, _REACH) & (window.points_radar_m[:, 0] * position_radar_m[0] >= 0)
     return _cluster(window, steps, _amplitudes(window.snr_db), members, scale) if members.any() else None
 
 
@@ -196,14 +196,14 @@ def _cells(steps: Points3, amplitude: Values) -> tuple[Points3, Values]:
     return means[heaviest], mass[heaviest]
 
 
-def _near(steps: Points3, centre: Vector3, reach: float) -> Flags:
+def _are_near(steps: Points3, centre: Vector3, reach: float) -> Flags:
     away = steps - centre
     return np.asarray(np.einsum("ij,ij->i", away, away) <= reach**2)
 
 
 def _mean_shifted(centre: Vector3, steps: Points3, weight: Values) -> Vector3:
     for _ in range(_MEAN_SHIFTS):
-        inside = np.where(_near(steps, centre, _REACH), weight, 0.0)
+        inside = np.where(_are_near(steps, centre, _REACH), weight, 0.0)
         if inside.sum() > 0:
             centre = inside @ steps / inside.sum()
     return centre

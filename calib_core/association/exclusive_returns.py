@@ -39,7 +39,7 @@ def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
         np.stack([owner[alternatives], of[alternatives]], axis=1), axis=0, return_index=True, return_inverse=True
     )
     linked = np.concatenate([rows, alternatives]), np.concatenate([others, alternatives[firsts[sets.reshape(-1)]]])
-    roots = _joined(len(owner), *linked)
+    roots = _components(len(owner), *linked)
     return np.where(np.isin(roots, roots[rows]), roots, -1)
 
 
@@ -79,7 +79,7 @@ def _nearest(rows: Indices, owners: Indices, away: Values) -> Flags:
     return nearest
 
 
-def _joined(count: int, rows: Indices, others: Indices) -> Indices:
+def _components(count: int, rows: Indices, others: Indices) -> Indices:
     """Return the smallest row (count,) that each is linked to, directly or through others."""
     roots = np.arange(count)
     while True:
@@ -116,13 +116,13 @@ def exclusive_rows(cost: Values, first: Indices, labels: Indices) -> Indices:
     if not len(twice):
         return rows
     rows = rows.copy()
-    for members in _rivals(owner, labels, twice):
+    for members in _contested_groups(owner, labels, twice):
         options = [order[first[i] : first[i + 1]].tolist() for i in members]
         rows[members] = _cheapest(options, cost, labels)
     return rows
 
 
-def _rivals(owner: Indices, labels: Indices, contested: Indices) -> list[list[int]]:
+def _contested_groups(owner: Indices, labels: Indices, contested: Indices) -> list[list[int]]:
     """Return the sets of pairs that share returns with each other, directly or through others, and want the same one."""
     groups: list[set[int]] = []
     for label in np.unique(labels[labels >= 0]).tolist():

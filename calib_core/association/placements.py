@@ -191,7 +191,7 @@ def _belong_together(one: Dwell, other: Dwell) -> bool:
         )
         if shown
     ]
-    one_return = _near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
+    one_return = _is_near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
     return one_return or (bool(together) and all(together))
 
 
@@ -200,12 +200,12 @@ def _is_second_echo(dwell: Dwell, dwells: Sequence[Dwell]) -> bool:
     return any(
         other.snr_db > dwell.snr_db
         and _overlap_s(dwell, other) >= _MOST_OF_ECHO * (dwell.end - dwell.start) / NS_PER_S
-        and _near(dwell, replace(other, position_radar_m=2.0 * other.position_radar_m), _SAME_RETURN)
+        and _is_near(dwell, replace(other, position_radar_m=2.0 * other.position_radar_m), _SAME_RETURN)
         for other in dwells
     )
 
 
-def _near(one: Dwell, other: Dwell, reaches: float) -> bool:
+def _is_near(one: Dwell, other: Dwell, reaches: float) -> bool:
     apart = direction_cosines(one.position_radar_m) - direction_cosines(other.position_radar_m)
     return bool((np.abs(apart) <= reaches * one.reach).all())
 
@@ -215,7 +215,7 @@ def _without_breaks(dwells: Sequence[Dwell]) -> list[Dwell]:
     joined: list[Dwell] = []
     for dwell in sorted(dwells, key=lambda dwell: (dwell.start, dwell.end)):
         for i, other in enumerate(joined):
-            if _near(dwell, other, _NOT_MOVED) and -_overlap_s(dwell, other) < _LONGEST_BREAK_S:
+            if _is_near(dwell, other, _NOT_MOVED) and -_overlap_s(dwell, other) < _LONGEST_BREAK_S:
                 longest = max(dwell, other, key=lambda one: one.end - one.start)
                 joined[i] = replace(longest, start=min(dwell.start, other.start), end=TimeNs(max(dwell.end, other.end)))
                 break

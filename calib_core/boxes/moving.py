@@ -83,7 +83,7 @@ def changed_boxes(
     size = (images[0][1].shape[1], images[0][1].shape[0])
     del images
     background = _background(small)
-    _refuse_moving_camera([_changed(image, background) for image in small], background, source)
+    _refuse_moving_camera([_changed_pixels(image, background) for image in small], background, source)
     found: list[tuple[TimeNs, list[Box]]] = []
     stretches = _stretches(image_times, most_frames)
     total = sum(map(len, stretches))
@@ -92,7 +92,9 @@ def changed_boxes(
     for stretch in stretches:
         found = []
         for index, image in _readable(read_image, stretch):
-            found.append((TimeNs(int(image_times[index])), _regions(_changed(_reduced(image), background), size)))
+            found.append(
+                (TimeNs(int(image_times[index])), _regions(_changed_pixels(_reduced(image), background), size))
+            )
             if progress:
                 progress(len(named) + len(found), total)
         tracks = tracked([boxes for _, boxes in found], first_track)
@@ -168,7 +170,7 @@ def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:
     return np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
 
 
-def _changed(image: np.ndarray, background: _Background) -> np.ndarray:
+def _changed_pixels(image: np.ndarray, background: _Background) -> np.ndarray:
     """Return which pixels of a frame differ from the background: (h, w) bool, cleaned of specks."""
     import cv2
 

@@ -25,7 +25,7 @@ from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMes
 from calib_core.recordings.messages.definitions import with_definition
 from calib_core.recordings.topics import join_topics
 from calib_core.results import Calibration
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 
 _PROGRESS_MESSAGES = 256
 _MEANING = "transforms are poses of the child in the parent, quaternion x y z w; calibration.json is attached"
@@ -236,7 +236,7 @@ class Additions:
         yield from self._due_clouds(message.log_time)
         yield from self._transforms(message.log_time)
         if message.channel.topic == self.recording.image_topic and self.plan.info.written:
-            yield self._counted(self._info, self._template.stamped(self._stamp(message)), message.log_time)
+            yield self._count_message(self._info, self._template.stamped(self._stamp(message)), message.log_time)
 
     def rest(self, last_ns: int) -> Iterator[StoredMessage]:
         """Yield what remains after the last recorded message."""
@@ -250,7 +250,7 @@ class Additions:
         joint = self.plan.frames.joint
         if joint is not None and joint.parent_from_child is not None:
             body = TransformMessage(stampable(log_time), joint.parent, joint.child, joint.parent_from_child)
-            yield self._counted(self._transform, self.build.serialised(body), log_time)
+            yield self._count_message(self._transform, self.build.serialised(body), log_time)
 
     def _due_clouds(self, log_time: int) -> Iterator[StoredMessage]:
         while self._cloud is not None and self._cloud.log_time <= log_time:
@@ -258,10 +258,10 @@ class Additions:
             if topic not in self._cloud_channels:
                 self._cloud_channels[topic] = self.build.channel(topic, CloudMessage)
             due_ns = max(self._cloud.log_time, self._first_ns)
-            yield self._counted(self._cloud_channels[topic], self.build.serialised(cloud), due_ns)
+            yield self._count_message(self._cloud_channels[topic], self.build.serialised(cloud), due_ns)
             self._cloud = next(self._clouds, None)
 
-    def _counted(self, channel: StoredChannel, data: bytes, log_time: int) -> StoredMessage:
+    def _count_message(self, channel: StoredChannel, data: bytes, log_time: int) -> StoredMessage:
         number = self.counts[channel.topic] = self.counts.get(channel.topic, 0) + 1
         return StoredMessage(channel, data, log_time, log_time, number)
 
@@ -343,7 +343,9 @@ def write_into_recording(
         _write(writer, message)
     writer.finish()
     notes.extend(
-        f"{told(warning).message} ({warning.code})" for warning in recording.warnings if warning.code in _DAMAGE
+        f"{warning_remark(warning).message} ({warning.code})"
+        for warning in recording.warnings
+        if warning.code in _DAMAGE
     )
     return RecordingWritten(
         copied, dict(additions.counts), losses.by_topic, losses.fault, tuple(notes), _layout(recording, plan)
@@ -386,7 +388,7 @@ def _plan(recording: Recording, file: CalibrationFile) -> tuple[Plan, list[str]]
     _require_same_images(recording, file)
     frames, notes = _frames(recording, file)
     info = choose_topic(recording, file.calibration.camera, frames.camera)
-    notes.extend(note for note in (info.note, _about_distortion(file), _about_players(recording)) if note)
+    notes.extend(note for note in (info.note, _distortion_note(file), _player_note(recording)) if note)
     drawn = recording.has_plain_clouds and frames.radar == recording.radar_frame
     corrected = has_corrections(file.calibration) and recording.radar_topic is not None
     as_reported = not drawn and recording.radar_topic is not None
@@ -442,7 +444,7 @@ def _require_same_images(recording: Recording, file: CalibrationFile) -> None:
         )
 
 
-def _about_distortion(file: CalibrationFile) -> str:
+def _distortion_note(file: CalibrationFile) -> str:
     if not file.calibration.camera.is_distorted:
         return ""
     return (
@@ -451,7 +453,7 @@ def _about_distortion(file: CalibrationFile) -> str:
     )
 
 
-def _about_players(recording: Recording) -> str:
+def _player_note(recording: Recording) -> str:
     if not any("ROS 1" in source.container for source in recording.sources):
         return ""
     return (

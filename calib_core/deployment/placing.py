@@ -93,11 +93,11 @@ class RecordedFrames:
             else:
                 steps.append(joint.parent_from_child)
             frames.append(joint.parent)
-        whole = reduce(_above, steps, RigidTransform.identity())
+        whole = reduce(_pose_above, steps, RigidTransform.identity())
         return Chain(tuple(frames), None if moving or fault else whole, fault)
 
 
-def _above(below: RigidTransform, step: RigidTransform) -> RigidTransform:
+def _pose_above(below: RigidTransform, step: RigidTransform) -> RigidTransform:
     return step @ below
 
 
@@ -177,23 +177,25 @@ def place_transform(
             own_radar_frame
             or f"the recording's own transforms are contradictory ({above_camera.fault or above_radar.fault})"
         )
-        return _beside(camera_from_radar, camera, frames, why)
+        return _frames_below_camera(camera_from_radar, camera, frames, why)
     if above_camera.root == above_radar.root:
-        return _joined(camera_from_radar, above_camera, above_radar, frames)
+        return _joined_frames(camera_from_radar, above_camera, above_radar, frames)
     if above_camera.pose_in_root is not None:
         link, link_from_camera = above_camera.root, above_camera.pose_in_root
         radar_from_link = (link_from_camera @ camera_from_radar).inverse()
         joint = Joint(radar, link, radar_from_link)
-        return SensorFrames(camera, radar, joint, _about_link(above_camera, joint))
+        return SensorFrames(camera, radar, joint, _link_notes(above_camera, joint))
     if above_radar.pose_in_root is not None:
         link_from_radar = above_radar.pose_in_root
         joint = Joint(camera, above_radar.root, camera_from_radar @ link_from_radar.inverse())
         note = f"{camera} moves in the recording's own tree, so {joint.child} is written as its child"
         return SensorFrames(camera, radar, joint, (note,))
-    return _beside(camera_from_radar, camera, frames, "camera and radar both move in the recording's own transforms")
+    return _frames_below_camera(
+        camera_from_radar, camera, frames, "camera and radar both move in the recording's own transforms"
+    )
 
 
-def _about_link(above_camera: Chain, joint: Joint) -> tuple[str, ...]:
+def _link_notes(above_camera: Chain, joint: Joint) -> tuple[str, ...]:
     if len(above_camera.frames) == 1:
         return ()
     return (
@@ -202,14 +204,14 @@ def _about_link(above_camera: Chain, joint: Joint) -> tuple[str, ...]:
     )
 
 
-def _joined(
+def _joined_frames(
     camera_from_radar: RigidTransform, above_camera: Chain, above_radar: Chain, frames: RecordedFrames
 ) -> SensorFrames:
     """Compare with what the recording states, and keep clear of it if it differs."""
     camera, radar = above_camera.frames[0], above_radar.frames[0]
     if above_camera.pose_in_root is None or above_radar.pose_in_root is None:
         why = f"the recording's own transforms connect {radar} and {camera} already, through a joint that moves"
-        return _beside(camera_from_radar, camera, frames, why)
+        return _frames_below_camera(camera_from_radar, camera, frames, why)
     base_from_camera, base_from_radar = above_camera.pose_in_root, above_radar.pose_in_root
     recorded_camera_from_radar = base_from_camera.inverse() @ base_from_radar
     turned_rad = rotation_angle_rad(recorded_camera_from_radar.rotation.T @ camera_from_radar.rotation)
@@ -222,10 +224,12 @@ def _joined(
         f"the recording's own transforms connect {radar} and {camera} already, and state a pose that differs by "
         f"{np.degrees(turned_rad):.3g} deg and {moved_m * 100:.3g} cm; a second one would break the tree"
     )
-    return _beside(camera_from_radar, camera, frames, why)
+    return _frames_below_camera(camera_from_radar, camera, frames, why)
 
 
-def _beside(camera_from_radar: RigidTransform, camera: str, frames: RecordedFrames, why: str) -> SensorFrames:
+def _frames_below_camera(
+    camera_from_radar: RigidTransform, camera: str, frames: RecordedFrames, why: str
+) -> SensorFrames:
     """Give the returns a frame of their own below the camera, which is right whatever the rest of the tree says."""
     name = OWN_RADAR_FRAME
     while name in frames.names or name == camera:

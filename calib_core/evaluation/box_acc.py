@@ -64,8 +64,8 @@ def judged_by_boxes(
         acc_standard_error=error,
         acc_without_zero_frames=float(above.mean()) if len(above) else None,
         frames=_frames(counted, inside),
-        classes=_named(counted.labels, counted, inside),
-        objects=_named(counted.targets, counted, inside),
+        classes=_acc_by_name(counted.labels, counted, inside),
+        objects=_acc_by_name(counted.targets, counted, inside),
         ranges=_ranges(counted, inside),
         sensitivity=_sensitivity(points_camera_m, camera, counted, error, progress) if len(shares) else (),
         chance=_chance(points_camera_m, camera, counted) if len(shares) else None,
@@ -77,7 +77,7 @@ def judged_by_boxes(
         targets=counted.found_targets,
         matched_targets=counted.matched_targets,
         returns=BoxedReturns(
-            np.searchsorted(_frames_in_view(counted), counted.frames),
+            np.searchsorted(_shown_frames(counted), counted.frames),
             counted.points_radar_m,
             pixels_px,
             counted.boxes_px,
@@ -153,7 +153,7 @@ def _mean_share(inside: Flags, frames: Indices) -> float:
     return float(_shares(inside, frames)[0].mean())
 
 
-def _turned(points_camera_m: Points3, axis: Vector3, angle_deg: float) -> np.ndarray:
+def _turn_points(points_camera_m: Points3, axis: Vector3, angle_deg: float) -> np.ndarray:
     return points_camera_m @ rotation_exp(np.deg2rad(angle_deg) * np.asarray(axis)).T
 
 
@@ -168,7 +168,7 @@ def _sensitivity(
     for number, (name, axis) in enumerate(AXES.items()):
         accs = []
         for step, angle in enumerate(ANGLES_DEG):
-            pixels = seen_pixels(_turned(points_camera_m, np.array(axis), angle), camera)
+            pixels = seen_pixels(_turn_points(points_camera_m, np.array(axis), angle), camera)
             accs.append(_mean_share(inside_own_boxes(pixels, counted.boxes_px), counted.frames))
             if progress is not None:
                 progress(number * len(ANGLES_DEG) + step + 1, len(AXES) * len(ANGLES_DEG))
@@ -179,7 +179,7 @@ def _sensitivity(
 def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -> float:
     """Return the mean Acc of the calibration turned by 10 deg to the left and to the right."""
     yaw = np.array(AXES["yaw"])
-    pixels = [seen_pixels(_turned(points_camera_m, yaw, side * _CHANCE_DEG), camera) for side in (-1.0, 1.0)]
+    pixels = [seen_pixels(_turn_points(points_camera_m, yaw, side * _CHANCE_DEG), camera) for side in (-1.0, 1.0)]
     return float(np.mean([_mean_share(inside_own_boxes(pixel, counted.boxes_px), counted.frames) for pixel in pixels]))
 
 
@@ -207,17 +207,17 @@ def _frames(counted: CountedReturns, inside: Flags) -> tuple[FrameFigure, ...]:
             boxes=int(counted.box_counts[i]),
             range_m=float(np.median(range_m[ends[i] : ends[i + 1]])) if returns[i] else float("nan"),
         )
-        for i in _frames_in_view(counted).tolist()
+        for i in _shown_frames(counted).tolist()
     )
 
 
-def _frames_in_view(counted: CountedReturns) -> Indices:
+def _shown_frames(counted: CountedReturns) -> Indices:
     """Return the frames that have returns or boxes; the others are left out of the figures."""
     returns = np.bincount(counted.frames, minlength=len(counted.image_times))
     return np.flatnonzero((returns > 0) | (counted.box_counts > 0))
 
 
-def _named(names: Sequence[str], counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:
+def _acc_by_name(names: Sequence[str], counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:
     """Return Acc by the names of the returns (n,): their classes, or their targets."""
     of_return = np.array(names, dtype=object)
     figures = []

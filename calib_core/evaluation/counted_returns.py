@@ -238,7 +238,7 @@ def renamed_classes(boxes: Boxes, names: dict[str, str]) -> Boxes:
     for name in names:
         if name not in boxes.labels:
             raise InputError(
-                f"{boxes.source}: no box is of the class '{name}' to be renamed; there are: {_listed(boxes)}"
+                f"{boxes.source}: no box is of the class '{name}' to be renamed; there are: {_name_list(boxes)}"
             )
     frames = tuple(
         replace(frame, boxes=tuple(replace(box, label=names.get(box.label, box.label)) for box in frame.boxes))
@@ -272,12 +272,12 @@ def _require_classes(boxes: Boxes, classes: Sequence[str]) -> None:
     unknown = [name for name in classes if name not in boxes.labels]
     if unknown and len(unknown) == len(classes):
         raise InputError(
-            f"{boxes.source}: no box is of the class '{unknown[0]}'; there are: {_listed(boxes)}; name one of these, or map "
+            f"{boxes.source}: no box is of the class '{unknown[0]}'; there are: {_name_list(boxes)}; name one of these, or map "
             f"a class to it, as in --class-map pedestrian={unknown[0]}"
         )
 
 
-def _listed(boxes: Boxes) -> str:
+def _name_list(boxes: Boxes) -> str:
     return ", ".join(f"'{label}'" for label in boxes.labels) or "no boxes at all"
 
 
@@ -578,10 +578,10 @@ def match_by_bearing(sightings: Sightings, table: BoxTable, camera: Camera) -> M
     if not len(meetings.sightings):
         return _matches(sightings, np.full(len(sightings.frames), -1), None, camera)
     bearings = Bearings(_turn(meetings), 0.0)
-    chosen = _chosen(meetings, sightings, table, bearings)
+    chosen = _choose_meetings(meetings, sightings, table, bearings)
     for _ in range(_ROUNDS - 1):
         bearings = _refined(meetings.some(chosen), bearings)
-        chosen = _chosen(meetings, sightings, table, bearings)
+        chosen = _choose_meetings(meetings, sightings, table, bearings)
     boxes = np.full(len(sightings.frames), -1)
     boxes[meetings.sightings[chosen]] = meetings.boxes[chosen]
     parts = _parts(meetings, meetings.misfits(bearings), sightings, table, boxes)
@@ -626,7 +626,7 @@ def returns_in_cuboids(
     none = _sightings((), each[:0], each[:0], points[:0]), Matches(each[:0], np.zeros(0, dtype=np.bool_), None)
     if not len(planar):
         return none
-    place = _placed(meetings, planar, cuboids, grown_m)
+    place = _radar_placement(meetings, planar, cuboids, grown_m)
     outside_m = _outside_m(place, planar, cuboids)
     inside = np.flatnonzero(outside_m <= grown_m)
     away = [
@@ -649,7 +649,7 @@ def returns_in_cuboids(
     )
 
 
-def _placed(meetings: _Meetings, planar: np.ndarray, cuboids: np.ndarray, grown_m: Values) -> Vector3:
+def _radar_placement(meetings: _Meetings, planar: np.ndarray, cuboids: np.ndarray, grown_m: Values) -> Vector3:
     """Return the turn of the camera [rad] and the radar's place ahead and to the left of it [m] with most returns in cuboids."""
     first = np.flatnonzero(np.diff(meetings.sightings, prepend=-1))
     place = np.array([_turn(meetings), 0.0, 0.0])
@@ -668,7 +668,7 @@ def _outside_m(place: np.ndarray, planar: np.ndarray, cuboids: np.ndarray) -> Va
     """Return how far returns (m, 2) are outside cuboids (m, 5), seen from above (m,) [m]; 0 inside.
 
     Args:
-        place: of the radar, as `_placed` finds it.
+        place: of the radar, as `_radar_placement` finds it.
         planar: x and y of the returns in the radar frame.
         cuboids: as in a BoxTable.
     """
@@ -775,7 +775,7 @@ def _refined(meetings: _Meetings, bearings: Bearings) -> Bearings:
     )
 
 
-def _chosen(meetings: _Meetings, sightings: Sightings, table: BoxTable, bearings: Bearings) -> Indices:
+def _choose_meetings(meetings: _Meetings, sightings: Sightings, table: BoxTable, bearings: Bearings) -> Indices:
     """Return the meetings that become matches: pairs of a target and a box track, those that agree longest first."""
     misfits = meetings.misfits(bearings)
     targets, tracks = sightings.targets[meetings.sightings], table.tracks[meetings.boxes]

@@ -11,7 +11,7 @@ from calib_core.input_files import encodable
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.measurements import Stamp, TimeNs
 from calib_core.words.outcomes import warning_text
-from calib_core.words.unpaired import unpaired_told
+from calib_core.words.unpaired import unpaired_remark
 
 EVALUATION_SCHEMA = "cocalib/evaluation-1"
 
@@ -82,7 +82,7 @@ def _residuals(figures: ResidualFigures) -> dict[str, Any]:
             )
         ],
         "unpaired": [
-            {"id": one.id, "code": one.code, "reason": str(unpaired_told(one).message)} for one in figures.unpaired
+            {"id": one.id, "code": one.code, "reason": str(unpaired_remark(one).message)} for one in figures.unpaired
         ],
     }
 

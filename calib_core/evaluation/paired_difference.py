@@ -53,7 +53,7 @@ def residual_difference(a: ResidualFigures, b: ResidualFigures, *, lost_px: floa
     differences = np.bincount(groups, weights=lengths[1] - lengths[0]) / np.maximum(np.bincount(groups), 1)
     error = float(differences.std(ddof=1) / np.sqrt(len(differences))) if len(differences) > 1 else float("nan")
     same = bool((np.abs(lengths[1] - lengths[0]) < _SAME_PX).all())
-    return _judged(float(differences.mean()), error, len(differences), less_is_better=True, same=same)
+    return _judge_difference(float(differences.mean()), error, len(differences), less_is_better=True, same=same)
 
 
 def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
@@ -68,10 +68,12 @@ def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
         return None
     differences: Values = np.array([other.share - one.share for one, other in both])
     error, groups = grouped_error(differences, np.array([one.image_time for one, _ in both], dtype=np.int64))
-    return _judged(float(differences.mean()), error, groups, less_is_better=False)
+    return _judge_difference(float(differences.mean()), error, groups, less_is_better=False)
 
 
-def _judged(mean: float, error: float, groups: int, *, less_is_better: bool, same: bool = False) -> PairedDifference:
+def _judge_difference(
+    mean: float, error: float, groups: int, *, less_is_better: bool, same: bool = False
+) -> PairedDifference:
     from scipy.special import stdtr, stdtrit
 
     if same or (mean == 0.0 and not error > 0.0):

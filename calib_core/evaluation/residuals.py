@@ -101,7 +101,7 @@ def residual_figures(
     """
     if not isinstance(found, AssociatedPairs):
         found = associated_pairs(found, calibration.camera, calibration.options)
-    pairs, positions = _under(found, calibration)
+    pairs, positions = _pairs_under(found, calibration)
     pixels_px = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
     projected_px = calibration.reproject(positions)
     distances_px = np.linalg.norm(projected_px - pixels_px, axis=1)
@@ -132,7 +132,7 @@ def residual_figures(
     )
 
 
-def _under(found: AssociatedPairs, calibration: Calibration) -> tuple[tuple[Pair, ...], np.ndarray]:
+def _pairs_under(found: AssociatedPairs, calibration: Calibration) -> tuple[tuple[Pair, ...], np.ndarray]:
     """Return the pairs with one candidate each, and its positions (n, 3); of several, the one reprojected nearest."""
     single = []
     for pair in found.pairs:

@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, ResidualFigures, Sensitivity, Share, Spread
 from calib_core.words.outcomes import said_of
-from calib_core.words.unpaired import unpaired_told
+from calib_core.words.unpaired import unpaired_remark
 
 NOT_ACCURACY = (
     "Acc is not accuracy: a pose that is wrong by half a degree can score as well as the right one, or better; judge a pose "
@@ -79,13 +79,13 @@ def _residual_lines(figures: ResidualFigures) -> list[str]:
     rows = [residual_sentence(figures)]
     if figures.held_out is not None and figures.k_fold is not None:
         rows.append(
-            f"leave-one-out: {_held(figures.held_out)} by placement, {_held(figures.k_fold)} with "
+            f"leave-one-out: {_held_out_text(figures.held_out)} by placement, {_held_out_text(figures.k_fold)} with "
             f"{_count(figures.k_fold.folds, 'group')} of placements; independent of the evaluated calibration"
         )
     rows.append(f"  {figures.association}")
     if figures.unpaired:
         rows.append(
-            f"  {_count(len(figures.unpaired), 'click')} without a radar position: {unpaired_told(figures.unpaired[0]).message}"
+            f"  {_count(len(figures.unpaired), 'click')} without a radar position: {unpaired_remark(figures.unpaired[0]).message}"
         )
     named = (("range", "m"), ("azimuth", "deg"), ("column", "px"), ("row", "px"))
     for (name, unit), bins in zip(
@@ -129,7 +129,7 @@ def _box_lines(figures: BoxFigures) -> list[str]:
     return rows
 
 
-def _held(figures: HeldOut) -> str:
+def _held_out_text(figures: HeldOut) -> str:
     lost = int(np.isnan(figures.distances_px).sum())
     unsolved = f" ({_count(lost, 'click')} not predicted)" if lost else ""
     return f"AED {_px(figures.aed_px)}{unsolved}"

@@ -249,7 +249,7 @@ class Adoption:
     report: CheckReport
 
 
-def _judged(
+def _check_found(
     found: ImportedCalibration,
     source: str,
     *,
@@ -333,7 +333,7 @@ def adoption(
         raise InputError(
             f"{source}: is calibration-1 and contains the camera it was solved with; omit the other camera"
         )
-    report = _judged(found, source, camera=camera, against=against, pairs=pairs)
+    report = _check_found(found, source, camera=camera, against=against, pairs=pairs)
     tested = against is not None or pairs is not None
     if found.file is not None:
         raised = tested and found.file.rests_on == "imported_assumed" and report.verdict == "right"
@@ -409,7 +409,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
     Raises:
         InputError: the file contradicts itself, or fails its own check point.
     """
-    _judged(found, source, camera=camera)
+    _check_found(found, source, camera=camera)
     return _as_calibration(found, source, camera=camera)
 
 

@@ -517,13 +517,13 @@ def find_aprilgrid(grey: np.ndarray, board: Board) -> tuple[Indices, Points2] | 
     numbers, sides = numbers[known], sides[known]
     if len(numbers) < _LEAST_TAGS:
         return None
-    turned = _turned(board, numbers, sides)
+    turned = _number_tag_corners(board, numbers, sides)
     if turned is None:
         return None
     return _refined_marked(grey, board, (4 * numbers[:, None] + np.arange(4)).ravel(), turned.reshape(-1, 2))
 
 
-def _turned(board: Board, numbers: Indices, sides: np.ndarray) -> np.ndarray | None:
+def _number_tag_corners(board: Board, numbers: Indices, sides: np.ndarray) -> np.ndarray | None:
     """Number the corners of each tag (n, 4, 2) as the board does: the turn whose grid is most nearly a plane; None if none is."""
     import cv2
 

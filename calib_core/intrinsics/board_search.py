@@ -258,7 +258,7 @@ class ImageOrder:
         if not self._asked:
             batch = self._everywhere()
         else:
-            batch = [] if self._count <= _EVERY_ONE else self._between(sorted(self._asked), set(found))
+            batch = [] if self._count <= _EVERY_ONE else self._gap_middles(sorted(self._asked), set(found))
         self._asked.update(batch)
         self.total = max(self.total, len(self._asked))
         return batch
@@ -270,7 +270,7 @@ class ImageOrder:
         even = np.linspace(0, self._count - 1, _FIRST_PASS).round().astype(int)
         return list(dict.fromkeys(even[_far_apart(len(even))].tolist()))
 
-    def _between(self, asked: list[int], found: set[int]) -> list[int]:
+    def _gap_middles(self, asked: list[int], found: set[int]) -> list[int]:
         """Return the middles of the gaps beside images with the board, the widest first, as far as the number allows."""
         gaps = [
             (after - before, (before + after) // 2)
@@ -361,7 +361,12 @@ def _without_duplicates(views: Sequence[BoardCorners], outlines: np.ndarray, lef
         near_px = max(_SAME_PX, _SAME_SHARE * views[row].size_px[0])
         turned = outlines[row].reshape(4, 2)[[2, 3, 0, 1]].ravel()  # a checkerboard looks the same from both ends
         same = next(
-            (one for one in kept if min(_apart(outlines[one], outlines[row]), _apart(outlines[one], turned)) < near_px),
+            (
+                one
+                for one in kept
+                if min(_outline_distance_px(outlines[one], outlines[row]), _outline_distance_px(outlines[one], turned))
+                < near_px
+            ),
             None,
         )
         if same is None:
@@ -373,7 +378,7 @@ def _without_duplicates(views: Sequence[BoardCorners], outlines: np.ndarray, lef
     return sorted(kept)
 
 
-def _apart(a: Values, b: Values) -> float:
+def _outline_distance_px(a: Values, b: Values) -> float:
     """Return the rms distance between two outlines (8,) [px]."""
     return float(np.sqrt(np.square(a - b).sum() / 4.0))
 

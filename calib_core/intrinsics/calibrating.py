@@ -101,7 +101,7 @@ def calibrate_lens(
 def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, CalibratedLens | Unsolvable]:
     """Calibrate in steps; what each of them does is yielded before it."""
     yield "comparing the views"
-    used = _used(search, model)
+    used = _views_to_use(search, model)
     if isinstance(used, Unsolvable):
         return used
     yield "choosing a lens model"
@@ -119,7 +119,7 @@ def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, Calib
     return _calibrated(search, used, chosen, shape, modelled=modelled)
 
 
-def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
+def _views_to_use(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     """Find the views to use; too few are no calibration."""
     board_m = search.board.corners_m
     faults = [_fault(view, board_m, search.size_px) for view in search.views]
@@ -133,7 +133,7 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     states = _starts(stack, model)
     if not states:
         return Unsolvable("no-lens", {"views": len(views), "why": "no focal length explains them", "model": model})
-    judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
+    judged = _judge_by_best_lens(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
     reasons = zip(views, judged.reasons, strict=True)
     left_out += [LeftOutImage(view.index, view.name, reason) for view, reason in reasons if reason]
     views = [view for view, reason in zip(views, judged.reasons, strict=True) if not reason]
@@ -170,7 +170,7 @@ def _starts(stack: ViewStack, model: LensChoice) -> list[LensState]:
     return [state for one in models if (state := start(one, stack)) is not None]
 
 
-def _judged(
+def _judge_by_best_lens(
     views: Sequence[BoardCorners], stack: ViewStack, states: Sequence[LensState], *, may_be_mirrored: bool
 ) -> JudgedViews:
     """Judge the views by the lens that most corners fit: a lens that is too simple makes good views look bad."""
@@ -287,14 +287,14 @@ def worst_focal_sigma(camera: Camera) -> float:
 
 def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[DataWarning]:
     """Say what is doubtful about a lens and the views that it was calibrated with."""
-    yield from _about_views(camera, stack)
-    yield from _about_numbers(camera, rms_px)
+    yield from _view_warnings(camera, stack)
+    yield from _number_warnings(camera, rms_px)
     outside = folds_back(camera, image_places(stack.size_px))
     if outside.any() and camera.lens.is_perspective:
         yield DataWarning("lens-folds-back", {"share": float(outside.mean())})
 
 
-def _about_views(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
+def _view_warnings(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
     covered = _covered_share(stack)
     if covered < _LEAST_COVERED:
         yield DataWarning("little-covered", {"share": covered})
@@ -305,7 +305,7 @@ def _about_views(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
         yield DataWarning("weak-focal-length", {"sigma": sigma})
 
 
-def _about_numbers(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
+def _number_warnings(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
     fx, fy, cx, cy = camera.parameters[:4].tolist()
     off = np.abs([cx / (camera.width_px - 1) - 0.5, cy / (camera.height_px - 1) - 0.5])
     if off.max() > _FAR_PRINCIPAL_POINT:

@@ -67,10 +67,10 @@ def split_difference(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = 
     near = np.zeros(len(order), dtype=bool)
     near[order[: len(order) // 2]] = True
     splits = (("every other view", np.arange(len(order)) % 2 == 0), ("near and far views", near))
-    return max((_compared(lens, text, half, columns, rows) for text, half in splits), key=lambda one: one.ratio)
+    return max((_compare_halves(lens, text, half, columns, rows) for text, half in splits), key=lambda one: one.ratio)
 
 
-def _compared(lens: CalibratedLens, text: str, half: Flags, columns: int, rows: int) -> SplitDifference:
+def _compare_halves(lens: CalibratedLens, text: str, half: Flags, columns: int, rows: int) -> SplitDifference:
     """Compare the lenses of some of the views and of the others."""
     size_px = (lens.camera.width_px, lens.camera.height_px)
     views = [view.corners for view in lens.views]
@@ -83,7 +83,7 @@ def _compared(lens: CalibratedLens, text: str, half: Flags, columns: int, rows: 
     first, first_matrix = _half(state, stack, half)
     second, second_matrix = _half(state, stack, ~half)
     expected = grid_covariance(lens.camera, first_matrix + second_matrix, places, found_px).trace(axis1=1, axis2=2)
-    apart = np.square(_apart(first, second, places, found_px)).sum(axis=1)
+    apart = np.square(_projection_differences(first, second, places, found_px)).sum(axis=1)
     reached = _reached(places, found_px, size_px, columns, rows) & np.isfinite(expected) & np.isfinite(apart)
     ratio = float(np.sqrt((apart[reached] / expected[reached]).mean())) if reached.any() else float("nan")
     return SplitDifference(
@@ -98,7 +98,7 @@ def _half(state: LensState, stack: ViewStack, half: Flags) -> tuple[Camera, np.n
     return found.camera, shared_covariance(reduced(linearize(found, stack.of(half), freedom))).matrix
 
 
-def _apart(first: Camera, second: Camera, places_px: Points2, found_px: Points2) -> Points2:
+def _projection_differences(first: Camera, second: Camera, places_px: Points2, found_px: Points2) -> Points2:
     """Return by how much far points project elsewhere (n, 2) [px], after the rotation that fits best where corners were found."""
     rays = first.rays(found_px)
     turn = np.eye(3)

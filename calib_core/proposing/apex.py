@@ -173,7 +173,9 @@ def find_apex(
     if not inside:
         return NoApex(_what_was_seen(proposals, reach_px))
     best, *others = inside
-    apart_px = max((float(np.hypot(*(rival.pixel_px - best.pixel_px))) for rival in _rivals(best, others)), default=0.0)
+    apart_px = max(
+        (float(np.hypot(*(rival.pixel_px - best.pixel_px))) for rival in _rival_corners(best, others)), default=0.0
+    )
     if apart_px > 0.0:
         return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well", several=True)
     radius_px = best.factor * best.fit.radius_px
@@ -210,12 +212,12 @@ def _proposals(levels: dict[int, _Reduced], near_px: Vector2, reach_px: float) -
     for one in every:
         if len(chosen) == _TRIED:
             break
-        if all(_apart(one, other) for other in chosen):
+        if all(_are_apart(one, other) for other in chosen):
             chosen.append(one)
     return chosen
 
 
-def _apart(one: _Proposal, other: _Proposal) -> bool:
+def _are_apart(one: _Proposal, other: _Proposal) -> bool:
     distance_px = float(np.hypot(*(one.pixel_px - other.pixel_px)))
     return distance_px > max(2.5, 0.4 * max(one.factor * one.radius_px, other.factor * other.radius_px))
 
@@ -288,7 +290,7 @@ def _fitted(
     return _Found(fit, full_px, factor, 0.0 if before is None else float(np.hypot(*(full_px - before.pixel_px))))
 
 
-def _rivals(best: _Found, others: list[_Found]) -> list[_Found]:
+def _rival_corners(best: _Found, others: list[_Found]) -> list[_Found]:
     """Return other corners that fit about as well, and are not the same one."""
     return [
         one
@@ -393,7 +395,7 @@ def fit_sectors(
         state, at, damping = new_state, new, damping / 4.0
         if settled:
             break
-    return _described(disc, state, at)
+    return _sector_fit(disc, state, at)
 
 
 def _disc(grey: np.ndarray, apex_px: Vector2, radius_px: float) -> _Disc | None:
@@ -445,7 +447,7 @@ def _linearize(disc: _Disc, state: Values) -> _Linearized:
     return _Linearized(levels, disc.grey - fitted, jacobian)
 
 
-def _described(disc: _Disc, state: Values, at: _Linearized) -> SectorFit | None:
+def _sector_fit(disc: _Disc, state: Values, at: _Linearized) -> SectorFit | None:
     if float(np.hypot(state[0], state[1])) > disc.radius_px:
         return None
     freedom = max(len(disc.grey) - len(at.levels) - len(state), 1)
@@ -522,7 +524,7 @@ _HALF_TURN = (-0.90, -0.15)
 
 def may_be_corner(fit: SectorFit) -> bool:
     """Return whether a larger disc is worth a try."""
-    return _within(fit, _LOOSE)
+    return _is_within(fit, _LOOSE)
 
 
 def has_angles_of_corner(fit: SectorFit) -> bool:
@@ -540,10 +542,10 @@ def is_corner(fit: SectorFit, score: float, half_turn: float) -> bool:
     """
     limits = next(one for one in _STRICT if fit.radius_px >= one.from_px)
     steady = fit.slope_grey <= _STEEPEST * fit.step_grey
-    return steady and score >= limits.score and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1] and _within(fit, limits)
+    return steady and score >= limits.score and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1] and _is_within(fit, limits)
 
 
-def _within(fit: SectorFit, limits: _Limits) -> bool:
+def _is_within(fit: SectorFit, limits: _Limits) -> bool:
     return bool(
         fit.contrast >= limits.contrast
         and fit.least_step_grey >= limits.least_contrast * fit.residual_grey

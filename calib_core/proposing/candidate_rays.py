@@ -130,7 +130,7 @@ def candidate_rays(
         confirmed: clicks; one that lies within several dwells is a candidate of each.
     """
     below_db = weaker_db(views)
-    shared_by = [sum(_within(click, view) for view in views) for click in confirmed]
+    shared_by = [sum(_is_within(click, view) for view in views) for click in confirmed]
     choices = [_choices(view, below_db[i], options, confirmed, shared_by) for i, view in enumerate(views)]
     most = max(1, max(len(own) for own in choices))
     padded = [[*own, *[_Choice(0.0, 0.0, 1.0, 0.0)] * (most - len(own))] for own in choices]
@@ -193,7 +193,7 @@ def _choices(
             row,
         )
         for row, click in enumerate(confirmed)
-        if _within(click, view)
+        if _is_within(click, view)
     ]
     share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
     share *= 1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT)
@@ -205,7 +205,7 @@ def _choices(
     return [*(replace(click, odds=click.odds / len(clicks)) for click in clicks), *found]
 
 
-def _within(click: ReflectorClick, view: DwellView) -> bool:
+def _is_within(click: ReflectorClick, view: DwellView) -> bool:
     return view.placement.start <= click.image_time <= view.placement.end
 
 

@@ -108,7 +108,7 @@ def dwell_views(
     for number, placement in enumerate(placements):
         if stopped is not None and stopped():
             break
-        views.append(_seen(number, placements, frames, reflector_width_px(placement, camera, reflector_m)))
+        views.append(_median_view(number, placements, frames, reflector_width_px(placement, camera, reflector_m)))
         while done < len(views) and (len(views) > _SETTLED or number == last):
             if stopped is not None and stopped():
                 break
@@ -132,7 +132,7 @@ def reflector_width_px(placement: Placement, camera: Camera, reflector_m: float)
     return reflector_m / range_m * float(camera.matrix_px[0, 0])
 
 
-def _seen(number: int, placements: Sequence[Placement], frames: FrameSource, width_px: float) -> DwellView:
+def _median_view(number: int, placements: Sequence[Placement], frames: FrameSource, width_px: float) -> DwellView:
     """Take the median of a few frames of a dwell."""
     placement = placements[number]
     seen = seen_frames(frames_within(placement, frames.image_times), frames)
@@ -179,7 +179,7 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
     """
     if not view.change.size:
         return view.width_px
-    widths_px, shown = _shown(view, pixel_px)
+    widths_px, shown = _contrast_by_width(view, pixel_px)
     best = int(np.argmax(shown))
     stands_out = shown[best] > max(_STANDS_OUT * shown[0], _LEAST_SIGMAS)
     other = abs(np.log(widths_px[best] / widths_px[0])) > np.log(_STANDS_OUT)
@@ -188,10 +188,10 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
 
 def has_changed(view: DwellView, pixel_px: Vector2) -> bool:
     """Return whether something of any width changed at a pixel (2,) of the full image."""
-    return bool(view.change.size) and bool(_shown(view, pixel_px)[1].max() > _LEAST_SIGMAS)
+    return bool(view.change.size) and bool(_contrast_by_width(view, pixel_px)[1].max() > _LEAST_SIGMAS)
 
 
-def _shown(view: DwellView, pixel_px: Vector2) -> tuple[Values, Values]:
+def _contrast_by_width(view: DwellView, pixel_px: Vector2) -> tuple[Values, Values]:
     """Return widths, the reflector's first, and how much a thing of each stands out at a pixel."""
     middle = np.round((np.asarray(pixel_px) + 0.5) / view.factor - 0.5).astype(int)
     thought_px = view.width_px / view.factor
@@ -426,7 +426,7 @@ def averaged_over_dwell(view: DwellView, frames: FrameSource, clicked: int, pixe
     pixel_px = np.asarray(pixel_px, dtype=np.float64)
     own = frames.image(clicked)
     reach_px = max(_LEAST_REACH_PX, _REACH * view.width_px)
-    shown = [(own, np.zeros(2)), *_alike(own, view, frames, clicked, pixel_px)]
+    shown = [(own, np.zeros(2)), *_frames_alike(own, view, frames, clicked, pixel_px)]
     answers = [find_apex(one, pixel_px + shift, reach_px=reach_px, size_px=view.width_px) for one, shift in shown]
     apexes = [answer for answer in answers if isinstance(answer, Apex)]
     if not apexes or len(apexes) < _LEAST_SHARE * len(answers):
@@ -434,7 +434,7 @@ def averaged_over_dwell(view: DwellView, frames: FrameSource, clicked: int, pixe
     return _mean(apexes)
 
 
-def _alike(
+def _frames_alike(
     own: np.ndarray, view: DwellView, frames: FrameSource, clicked: int, pixel_px: Vector2
 ) -> Iterator[tuple[np.ndarray, Vector2]]:
     """Yield the other frames that show the same around a pixel, and by how much it moved there."""

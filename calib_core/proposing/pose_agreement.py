@@ -443,16 +443,16 @@ def refined_poses(rays: CandidateRays, prior: MountingPrior, rough: RoughPoses) 
         scored = replace(poses, scores=_scores(rays, prior, poses))
         better = scored.scores > best.scores
         best = RoughPoses(
-            _chosen(better, scored.rotations, best.rotations),
-            _chosen(better, scored.centres_radar_m, best.centres_radar_m),
-            _chosen(better, scored.scales, best.scales),
-            _chosen(better, scored.noise, best.noise),
-            _chosen(better, scored.scores, best.scores),
+            _choose_candidates(better, scored.rotations, best.rotations),
+            _choose_candidates(better, scored.centres_radar_m, best.centres_radar_m),
+            _choose_candidates(better, scored.scales, best.scales),
+            _choose_candidates(better, scored.noise, best.noise),
+            _choose_candidates(better, scored.scores, best.scores),
         )
     return best
 
 
-def _chosen(better: Flags, new: np.ndarray, old: np.ndarray) -> np.ndarray:
+def _choose_candidates(better: Flags, new: np.ndarray, old: np.ndarray) -> np.ndarray:
     return np.where(better.reshape(len(better), *[1] * (new.ndim - 1)), new, old)
 
 

@@ -79,7 +79,7 @@ def proposals_of(
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
     judged = _Judged.of(views, rays, agreement, by_clicks)
-    covered = _covered(rays, judged, len(clicks))
+    covered = _clicks_by_dwell(rays, judged, len(clicks))
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
@@ -107,7 +107,7 @@ def proposals_of(
     )
 
 
-def _covered(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
+def _clicks_by_dwell(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
     """Return the dwells with the rows of their confirmed clicks: each click is of the one of its dwells that it suits best.
 
     If something else there is probably the reflector, it is of none: the radar shows another one at that time.
@@ -175,9 +175,11 @@ class _Judged:
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:
-            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks.probability * _alike(views, rays)
+            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks.probability * _compared_with_click(
+                views, rays
+            )
         probability = _tempered(probability)
-        taken = _taken(views, rays, probability)
+        taken = _taken_by_others(views, rays, probability)
         sure = np.where(taken, 0.0, probability)
         return cls(views, rays, agreement, sure, trusted, reflectors, taken, weaker_db(views))
 
@@ -235,7 +237,7 @@ def _tempered(probability: Points2) -> Points2:
     return np.asarray(np.where(probability > 0.0, 1.0 / (1.0 + (1.0 / bounded - 1.0) ** (1.0 / _TEMPER)), 0.0))
 
 
-def _alike(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:
+def _compared_with_click(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:
     """Return which candidates (n, k) were compared with what a person clicked."""
     alike = np.zeros(rays.odds.shape, dtype=np.bool_)
     for i, view in enumerate(views):
@@ -246,7 +248,7 @@ def _alike(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:
     return alike & (rays.odds > 0.0)
 
 
-def _taken(views: Sequence[DwellView], rays: CandidateRays, probability: Points2) -> np.ndarray:
+def _taken_by_others(views: Sequence[DwellView], rays: CandidateRays, probability: Points2) -> np.ndarray:
     """Return which candidates (n, k) are the place of another dwell at the same time, to which it belongs more probably."""
     taken = np.zeros(rays.odds.shape, dtype=np.bool_)
     order = np.argsort(-probability.max(axis=1), kind="stable").tolist()

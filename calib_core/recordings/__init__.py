@@ -2,7 +2,7 @@
 
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import holds_recording
-from calib_core.recordings.containers.sources import about_assumptions, assumption_hint
+from calib_core.recordings.containers.sources import assumption_hint, assumption_warnings
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
 from calib_core.recordings.plain_files.folder_cameras import size_of_images_beside
@@ -34,8 +34,8 @@ __all__ = [
     "TopicSummary",
     "Verification",
     "WrittenVideo",
-    "about_assumptions",
     "assumption_hint",
+    "assumption_warnings",
     "clock_lines",
     "describe",
     "figures_text",

@@ -11,19 +11,19 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
-from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
+from calib_core.recordings.camera.image_stream import ImageStream, frames_of_one_size, image_stream, video_warnings
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.checks import (
-    about_claims,
-    about_images,
-    about_lost,
-    about_radar,
-    about_radar_frame,
     check_overlap,
+    claim_warnings,
+    image_warnings,
+    lost_message_warnings,
+    radar_frame_warnings,
+    radar_warnings,
     without_certain_zone,
 )
-from calib_core.recordings.containers.sources import Assumption, Source, about_assumptions
+from calib_core.recordings.containers.sources import Assumption, Source, assumption_warnings
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.plain_files.file_stamps import COUNTED
@@ -48,7 +48,7 @@ from calib_core.recordings.selection import (
     usage_of,
 )
 from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
-from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, clock_warnings, diagnose
 from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, StampedTopic, Topic, TopicSummary, join_topics, read_stamps
 
 _MOST_LATE_S = 1e10
@@ -122,8 +122,10 @@ def assemble(
     selection = select(inventory, options, require)
     stamped = _stamped(selection, inventory)
     choice = _radar_choice(selection, stamped, inventory)
-    used = _used(selection, choice, stamped)
-    lost = [warning for topic in used.all for warning in about_lost(topic.name, len(topic), stamped[topic.name])]
+    used = _topics_to_use(selection, choice, stamped)
+    lost = [
+        warning for topic in used.all for warning in lost_message_warnings(topic.name, len(topic), stamped[topic.name])
+    ]
     used = used.readable(stamped)
     clocks, stamps, about_choice = _clocks(used, stamped, inventory, options, before)
     warnings.extend([*lost, *choice.warnings, *about_choice])
@@ -135,19 +137,25 @@ def assemble(
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
     diagnoses = _diagnoses(stamped, (*(radar.parts if radar else ()), images), clocks, inventory, options)
-    warnings.extend(about_clocks(list(diagnoses.values())))
+    warnings.extend(clock_warnings(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
     beside = _camera_beside(sources, selection)
     if beside is not None and images is not None:
         camera, about_camera = published_camera(beside, images)
     warnings.extend(
-        [*about_camera, *about_radar(radar), *_about_claims(radar), *about_images(images), *about_video(images)]
+        [
+            *about_camera,
+            *radar_warnings(radar),
+            *_claim_warnings(radar),
+            *image_warnings(images),
+            *video_warnings(images),
+        ]
     )
     radar_frame = _frame(used.radars[0]) if used.radars else ""
-    warnings.extend(about_radar_frame(used.radars[0].name, radar_frame) if used.radars else [])
+    warnings.extend(radar_frame_warnings(used.radars[0].name, radar_frame) if used.radars else [])
     assumptions = without_certain_zone(_assumptions(sources, used, radar), radar, images)
     unconfirmed = () if options.confirm_assumptions else assumptions
-    warnings.extend(about_assumptions(unconfirmed))
+    warnings.extend(assumption_warnings(unconfirmed))
     return Assembly(
         topics=tuple(_summary(topic, inventory, used, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topics=tuple(topic.name for topic in used.radars),
@@ -197,7 +205,7 @@ class _Used:
         return replace(self, radars=radars, image=stamped[self.image.name].topic if self.image else None)
 
 
-def _used(selection: Selection, choice: RadarChoice, stamped: Mapping[str, StampedTopic]) -> _Used:
+def _topics_to_use(selection: Selection, choice: RadarChoice, stamped: Mapping[str, StampedTopic]) -> _Used:
     """Keep the topics of the chosen radar; without a choice, the only one."""
     by_name = {topic.name: topic for topic in selection.radars}
     names = choice.sensors[0].topics if choice.sensors else tuple(topic.name for topic in selection.radars[:1])
@@ -238,7 +246,7 @@ def _radar_choice(selection: Selection, stamped: Mapping[str, StampedTopic], inv
     for topic in selection.radars if len(selection.radars) > 1 else ():
         both = stamped[topic.name]
         if selection.radar_named:
-            about_lost(topic.name, len(topic), both)  # what the user named must be readable
+            lost_message_warnings(topic.name, len(topic), both)  # what the user named must be readable
         if len(both.topic):
             stamps = _both_clocks(both, inventory)
             clock = choose_clock(stamps).clocks[0]
@@ -347,8 +355,8 @@ def _topic_stream(topic: Topic, inventory: Inventory, times_ns: TimesNs, heads: 
     return RadarStream(topic, layouts, times_ns, heads, is_timed=times_from(topic) != COUNTED)
 
 
-def _about_claims(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
-    return [warning for part in (radar.parts if radar else ()) for warning in about_claims(part)]
+def _claim_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
+    return [warning for part in (radar.parts if radar else ()) for warning in claim_warnings(part)]
 
 
 def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs]) -> ImageStream | None:

@@ -165,11 +165,11 @@ def boxes_in_topic(topic: Topic, *, stamps_ns: TimesNs, times_ns: TimesNs) -> Bo
     places, notes = frames_of_stamps(
         np.array([stamp for stamp, _ in found], dtype=np.int64), f"topic {topic.name}", stamps_ns
     )
-    notes = (*notes, *_about_losses(lost, dropped))
+    notes = (*notes, *_loss_notes(lost, dropped))
     return Boxes(joined_frames([boxes for _, boxes in found], places, times_ns), topic.name, notes=notes)
 
 
-def _about_losses(lost: Sequence[str], dropped: int) -> Iterator[str]:
+def _loss_notes(lost: Sequence[str], dropped: int) -> Iterator[str]:
     if lost:
         yield f"{len(lost)} messages of boxes could not be read and are left out; the first: {lost[0]}"
     if dropped:
@@ -341,8 +341,8 @@ def frames_of_stamps(stamps: TimesNs, source: str, image_times: TimesNs) -> tupl
     within = (stamps >= image_times[0] - STAMP_TOLERANCE_NS) & (stamps <= image_times[-1] + STAMP_TOLERANCE_NS)
     if not within.any():
         raise InputError(
-            f"{source}: its frames are from {_shown(stamps.min())} to {_shown(stamps.max())}, the recorded ones from "
-            f"{_shown(image_times[0])} to {_shown(image_times[-1])}; is it of another recording?"
+            f"{source}: its frames are from {_value_text(stamps.min())} to {_value_text(stamps.max())}, the recorded ones from "
+            f"{_value_text(image_times[0])} to {_value_text(image_times[-1])}; is it of another recording?"
         )
     if np.count_nonzero(matches) < _LEAST_MATCHING * np.count_nonzero(within):
         raise InputError(
@@ -355,5 +355,5 @@ def frames_of_stamps(stamps: TimesNs, source: str, image_times: TimesNs) -> tupl
     return np.where(matches, nearest, -1), (note,) if missing else ()
 
 
-def _shown(time: int) -> str:
+def _value_text(time: int) -> str:
     return f"{int(time) / NS_PER_S:.3f} s"

@@ -29,7 +29,7 @@ _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
 _HOURS_S = range(-14 * 3600, 14 * 3600 + 1, 3600)
 
 
-def about_claims(radar: RadarStream) -> list[DataWarning]:
+def claim_warnings(radar: RadarStream) -> list[DataWarning]:
     """Warn about contradictions in a sample of a radar's messages."""
     plan, name = radar.layout.plan, radar.topic.name
     return _contradictions(name, plan, radar.claims(_SAMPLED_SCANS)) if any(plan.claimed) else []
@@ -136,7 +136,7 @@ def _elevation(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray
     ]
 
 
-def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning]:
+def lost_message_warnings(name: str, count: int, stamped: StampedTopic) -> list[DataWarning]:
     """Warn about the unreadable messages of a topic.
 
     Raises:
@@ -242,7 +242,7 @@ def _interval(times_ns: TimesNs) -> str:
     return f"{utc(TimeNs(int(times_ns[0])))} to {utc(TimeNs(int(times_ns[-1])))}"
 
 
-def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
+def radar_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
     """Warn if the radar looks like a lidar or measures no elevation, judging by a dozen scans."""
     if radar is None:
         return []
@@ -279,7 +279,7 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
     return warnings
 
 
-def about_radar_frame(name: str, frame: str) -> list[DataWarning]:
+def radar_frame_warnings(name: str, frame: str) -> list[DataWarning]:
     """Warn if a radar's frame has the name of a vehicle's: its noise, scales and biases are polar about the radar.
 
     Args:
@@ -299,7 +299,7 @@ def about_radar_frame(name: str, frame: str) -> list[DataWarning]:
     ]
 
 
-def about_images(images: ImageStream | None) -> list[DataWarning]:
+def image_warnings(images: ImageStream | None) -> list[DataWarning]:
     """Warn about images skipped because of repeated stamps."""
     if images is None or not images.repeated:
         return []

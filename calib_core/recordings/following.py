@@ -143,9 +143,9 @@ class FollowedRecording(Recording):
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
         """What the user must know, including what following has found."""
-        return (*super().warnings, *self._about_late(), *self._of_the_end)
+        return (*super().warnings, *self._late_warnings(), *self._of_the_end)
 
-    def _about_late(self) -> tuple[DataWarning, ...]:
+    def _late_warnings(self) -> tuple[DataWarning, ...]:
         if not self.late:
             return ()
         message = f"{self.late} frames of {self.image_topic} came later than frames with later stamps, and are left out"

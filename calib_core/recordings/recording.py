@@ -38,7 +38,7 @@ from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import InputFile
 from calib_core.results.confirmation import lost_returns
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12
@@ -205,7 +205,7 @@ class Recording:
     def warnings(self) -> tuple[DataWarning, ...]:
         """What the user must know, including unreadable messages and damage found so far."""
         warnings = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
-        return (*warnings, *self._unreadable(), *self._about_lost())
+        return (*warnings, *self._unreadable(), *self._lost_warnings())
 
     @property
     def damage(self) -> tuple[DataWarning, ...]:
@@ -224,7 +224,7 @@ class Recording:
                     "if there are many, copy the file again from its source",
                 )
 
-    def _about_lost(self) -> Iterator[DataWarning]:
+    def _lost_warnings(self) -> Iterator[DataWarning]:
         losses = self.losses()
         if losses.lost:
             yield lost_returns(losses.lost, losses.read, "the radar")
@@ -502,7 +502,7 @@ def _assembled(
         unused = next((w for source in sources for w in source.warnings if w.code == "unused-files"), None)
         if unused is None:
             raise
-        raise type(error)(f"{error}; {told(unused).message}") from error
+        raise type(error)(f"{error}; {warning_remark(unused).message}") from error
 
 
 def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:

@@ -295,7 +295,7 @@ def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Ne
     for kind, found in (("radar", bool(radars)), ("image", image is not None)):
         if not found and kind in require:
             raise _missing(inventory, "radar" if kind == "radar" else "image")
-    info = _chosen(inventory, "camera-info", options.camera_info_topic)
+    info = _topic_named(inventory, "camera-info", options.camera_info_topic)
     return Selection(radars, bool(named), sensor, image, info or _nearest_info(image, inventory))
 
 
@@ -307,7 +307,7 @@ def _named_radars(inventory: Inventory, requested: str | None) -> tuple[tuple[To
     names = [requested] if requested in known else [name.strip() for name in requested.split(",") if name.strip()]
     if len(names) == 1 and names[0] not in known and len(inventory.of_kind("radar")) > 1:
         return (), names[0]
-    topics = [_chosen(inventory, "radar", name) for name in dict.fromkeys(names or [requested])]
+    topics = [_topic_named(inventory, "radar", name) for name in dict.fromkeys(names or [requested])]
     return tuple(topic for topic in topics if topic is not None), None
 
 
@@ -335,7 +335,7 @@ def select_image(inventory: Inventory, requested: str | None) -> Topic | None:
     Raises:
         RecordingError: the requested topic does not exist or cannot be used.
     """
-    return _chosen(inventory, "image", requested) or _best(inventory.of_kind("image"), inventory, _image_rank)
+    return _topic_named(inventory, "image", requested) or _best(inventory.of_kind("image"), inventory, _image_rank)
 
 
 def image_choice(inventory: Inventory, image: Topic | None, requested: str | None) -> str:
@@ -354,7 +354,7 @@ def image_choice(inventory: Inventory, image: Topic | None, requested: str | Non
     return f"{image.name}, used because {why}; {rest}; choose another with --image-topic"
 
 
-def _chosen(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
+def _topic_named(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
     """Return the topic the user named."""
     if name is None:
         return None
@@ -484,7 +484,7 @@ def choose_radar(
     ]
     if selection.radar_named:
         (sensor,) = sensors_of(examined, together=True)
-        return RadarChoice((sensor,), f"{_described(sensor)}, as requested", tuple(_about_frames(examined)))
+        return RadarChoice((sensor,), f"{_radar_text(sensor)}, as requested", tuple(_frame_warnings(examined)))
     examined.sort(key=lambda one: (one.figures.doppler, one.stamped, bool(one.frame)), reverse=True)
     sensors = sensors_of(examined)
     if selection.sensor is not None:
@@ -492,7 +492,7 @@ def choose_radar(
         if not wanted:
             raise unknown_radar(inventory, selection.sensor, [sensor.name for sensor in sensors])
         others = tuple(sensor for sensor in sensors if sensor is not wanted[0])
-        return RadarChoice((wanted[0], *others), f"{_described(wanted[0])}, as requested")
+        return RadarChoice((wanted[0], *others), f"{_radar_text(wanted[0])}, as requested")
     return _chosen_radar(sensors, {one.name: one for one in examined}, inventory)
 
 
@@ -514,10 +514,10 @@ def _chosen_radar(sensors: Sequence[RadarSensor], examined: dict[str, Examined],
 
     ordered = tuple(sorted(sensors, key=rank, reverse=True))
     best, others = ordered[0], ordered[1:]
-    chosen = f"{_described(best)}{_why_not_read(best, examined)}"
+    chosen = f"{_radar_text(best)}{_why_not_read(best, examined)}"
     if not others:
         return RadarChoice(ordered, chosen if len(best.topics) > 1 or best.copies else "")
-    listed = "; ".join(_described(sensor) for sensor in others)
+    listed = "; ".join(_radar_text(sensor) for sensor in others)
     reason = f"{chosen}; {_why(best, others, examined)}; not used: {listed}"
     comparable = [
         sensor
@@ -565,15 +565,15 @@ def _why(best: RadarSensor, others: Sequence[RadarSensor], examined: dict[str, E
 
 
 def _unclear(best: RadarSensor, comparable: Sequence[RadarSensor]) -> DataWarning:
-    listed = "; ".join(_described(sensor) for sensor in comparable)
+    listed = "; ".join(_radar_text(sensor) for sensor in comparable)
     return DataWarning.reported(
         "several-radars",
-        f"there are {len(comparable) + 1} radars with comparable returns: {_described(best)} (used); {listed}",
+        f"there are {len(comparable) + 1} radars with comparable returns: {_radar_text(best)} (used); {listed}",
         f"if another one is to be calibrated, choose it: --radar-topic {comparable[0].name}",
     )
 
 
-def _about_frames(examined: Sequence[Examined]) -> list[DataWarning]:
+def _frame_warnings(examined: Sequence[Examined]) -> list[DataWarning]:
     """Warn about topics that the user joined although their frames say that they are different sensors."""
     if len({one.frame for one in examined}) < 2:
         return []
@@ -587,7 +587,7 @@ def _about_frames(examined: Sequence[Examined]) -> list[DataWarning]:
     ]
 
 
-def _described(sensor: RadarSensor) -> str:
+def _radar_text(sensor: RadarSensor) -> str:
     """Describe a radar by its topics, frame and figures."""
     own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
     second = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]

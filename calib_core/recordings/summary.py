@@ -364,7 +364,7 @@ def summary_text(summary: RecordingSummary) -> str:
     return "\n".join(line.rstrip().replace("\n", "\\u000a") for line in lines)  # a name may hold a line feed
 
 
-def _counted(count: int, what: str) -> str:
+def _count_text(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
@@ -380,7 +380,7 @@ def _times(summary: RecordingSummary) -> list[str]:
         f"{_seconds(summary.start)} to {_seconds(summary.end)} s since 1970",
     ]
     counts = [topic.count for topic in summary.topics]
-    lines.append(f"{_counted(sum(counts), 'message')} in {_counted(len(counts), 'topic')}")
+    lines.append(f"{_count_text(sum(counts), 'message')} in {_count_text(len(counts), 'topic')}")
     if summary.overlap_s is not None:
         lines.append(_shared_text(summary.overlap_s, summary.overlap_stretches or 0))
     return _labelled("time", lines)
@@ -478,7 +478,7 @@ def _radar_lines(radar: RadarSummary | None) -> list[str]:
     sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
     twice = ", each at every azimuth reported for it" if radar.other_azimuths else ""
     return [
-        f"{' + '.join(radar.topics)}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
+        f"{' + '.join(radar.topics)}, frame '{radar.frame}': {_count_text(radar.scans, 'scan')}{rate}{gap}",
         f"returns per scan: {middle:.0f} ({low} to {high}{sample}){twice}",
         radar.layout,
         *([f"other azimuths of the same returns: {', '.join(radar.other_azimuths)}"] if radar.other_azimuths else []),
@@ -535,7 +535,7 @@ def _camera_lines(camera: CameraSummary | None) -> list[str]:
     if camera.width_px is not None:
         size = f"{camera.width_px} x {camera.height_px} px, {camera.format}"
     return [
-        f"{camera.topic}, frame '{camera.frame}': {_counted(camera.frames, 'image')}{rate}{gap}",
+        f"{camera.topic}, frame '{camera.frame}': {_count_text(camera.frames, 'image')}{rate}{gap}",
         size,
         _intrinsics(camera),
         *([camera.choice] if camera.choice else []),
@@ -544,7 +544,9 @@ def _camera_lines(camera: CameraSummary | None) -> list[str]:
 
 def _boxes(topics: Sequence[TopicSummary]) -> list[str]:
     """List the topics that can be given as --boxes."""
-    return [f"{topic.name}: {topic.layout}, {_counted(topic.count, 'message')}" for topic in topics if topic.has_boxes]
+    return [
+        f"{topic.name}: {topic.layout}, {_count_text(topic.count, 'message')}" for topic in topics if topic.has_boxes
+    ]
 
 
 def _intrinsics(camera: CameraSummary) -> str:

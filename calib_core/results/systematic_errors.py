@@ -213,9 +213,11 @@ class LensPrior:
         parameters = self.camera.parameters + self.along_axes @ values
         least = _LEAST_FOCAL_SHARE * self.camera.parameters[:_FOCAL]
         parameters[:_FOCAL] = np.maximum(parameters[:_FOCAL], least)
-        return self.camera.with_parameters(parameters, None if covariance is None else self._known(covariance))
+        return self.camera.with_parameters(
+            parameters, None if covariance is None else self._camera_covariance(covariance)
+        )
 
-    def _known(self, covariance: np.ndarray) -> CameraCovariance:
+    def _camera_covariance(self, covariance: np.ndarray) -> CameraCovariance:
         """Return the covariance of the camera's parameters that any error moves."""
         moved = self.moves.any(axis=1)
         along = self.along_axes[moved]
@@ -617,7 +619,7 @@ def systematic_error_warnings(
         error.name: (error, *_by_pairs_alone(error, by_fit[error.name])) for error in errors if error.name in by_fit
     }
     beyond = {
-        name: _beyond_its_prior(error, size, sigma)
+        name: _beyond_prior_warning(error, size, sigma)
         for name, (error, size, sigma) in alone.items()
         if by_fit[name] ** 2 < (1.0 - _LEAST_TOLD) * error.prior_sigma**2
         and size > _BEYOND * np.hypot(sigma, error.prior_sigma)
@@ -630,7 +632,7 @@ def systematic_error_warnings(
     return [*beyond.values(), *scales]
 
 
-def _beyond_its_prior(error: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
+def _beyond_prior_warning(error: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
     value = float(np.copysign(size, error.value))
     facts = {"error": error.name, "value": value, "sigma": sigma, "prior_sigma": error.prior_sigma}
     return DataWarning("shared-error-suspected", facts)

@@ -220,10 +220,10 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
     if not _states_error(outcome):
         grave = warning if warning is not None and consequence_of(warning.code) == "coarse" else None
         return Verdict("coarse", _BY_DEFAULT, cause=grave, rms_px=outcome.metrics.rms_px)
-    return replace(_judged(outcome, stated_error(outcome), warning, left), assumed=_assumed(outcome))
+    return replace(_verdict_of_pose(outcome, stated_error(outcome), warning, left), assumed=_assumptions_of(outcome))
 
 
-def _assumed(calibration: Calibration) -> Assumed:
+def _assumptions_of(calibration: Calibration) -> Assumed:
     measured = calibration.options.solving.camera_position is not None
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
     known = given.covariance is not None or not sigma_px
@@ -266,7 +266,9 @@ def _states_error(calibration: Calibration) -> bool:
     )
 
 
-def _judged(calibration: Calibration, error: StatedError, warning: DataWarning | None, left: int | None) -> Verdict:
+def _verdict_of_pose(
+    calibration: Calibration, error: StatedError, warning: DataWarning | None, left: int | None
+) -> Verdict:
     """Judge a pose by its stated error, and by its gravest warning."""
     consequence: Consequence = "note" if warning is None else consequence_of(warning.code)
     count = sum(pair.inlier for pair in calibration.pairs)

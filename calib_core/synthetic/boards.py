@@ -369,7 +369,7 @@ def waved_poses(rng: np.random.Generator, board: Board, camera: Camera, count: i
     )
     transforms: list[RigidTransform] = []
     for place in _spread(rng, count):
-        drawn = (_drawn(rng, outline, middle, camera, place) for _ in range(_TRIES))
+        drawn = (_draw_board_pose(rng, outline, middle, camera, place) for _ in range(_TRIES))
         pose = next((pose for pose in drawn if pose is not None), None)
         if pose is None:
             raise OptionError(
@@ -386,7 +386,7 @@ def _spread(rng: np.random.Generator, count: int) -> Points2:
     return (np.stack([column, row], axis=1) + rng.uniform(size=(count, 2))) / side
 
 
-def _drawn(
+def _draw_board_pose(
     rng: np.random.Generator, outline: Points3, middle: np.ndarray, camera: Camera, place: Vector2
 ) -> RigidTransform | None:
     """Draw a tilt and a size, and shift the board into the region; None if it does not fit there."""

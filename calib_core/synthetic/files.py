@@ -74,7 +74,7 @@ def write_recording(
     written: list[Path] = []
     frame_count = len(recording.stage.frame_times.header_ns)
     for number, container in enumerate(containers):
-        frames = _counted(recording, progress, before=number * frame_count, total=len(containers) * frame_count)
+        frames = _count_frames(recording, progress, before=number * frame_count, total=len(containers) * frame_count)
         if container == "csv":
             written.extend(write_plain_files(recording, folder / "recording_csv", frames))
         elif container == "ros1":
@@ -106,7 +106,9 @@ def _write_truth(recording: SimulatedRecording, folder: Path, suffix: str = "") 
             (folder / "labels.json").write_text(labels_text(true_labels(recording)), encoding="utf-8")
 
 
-def _counted(recording: SimulatedRecording, progress: Progress, *, before: int, total: int) -> Iterator[SimulatedFrame]:
+def _count_frames(
+    recording: SimulatedRecording, progress: Progress, *, before: int, total: int
+) -> Iterator[SimulatedFrame]:
     for done, frame in enumerate(recording.frames(), start=before + 1):
         yield frame
         progress(done, total)

@@ -2,7 +2,7 @@
 
 from calib_core.measurements import Unpaired
 from calib_core.words.remark import Remark, by_code, remark
-from calib_core.words.unpaired import unpaired_told
+from calib_core.words.unpaired import unpaired_remark
 
 
 def boxes_note(*, source: str, note: str) -> Remark:
@@ -28,7 +28,7 @@ def mostly_moving(*, unfitted: int, scans: int) -> Remark:
 def no_paired_clicks(*, clicks: int = 0, first: Unpaired | None = None) -> Remark:
     if first is None:
         return remark("all clicks are excluded or untouched, so there are no residuals", "include clicks")
-    why = unpaired_told(first)
+    why = unpaired_remark(first)
     said = f"none of {clicks} clicks has a radar position, so there are no residuals: " + why.message
     return Remark(said, why.hint, why.action)
 

@@ -24,19 +24,20 @@ _BENDS = {
 def bent_board(*, bends_mm: Mapping[str, tuple[float, float]], modelled: bool) -> Remark:
     bends = [f"{abs(bend):.2f} ± {sigma:.2f} mm {_BENDS[name]}" for name, (bend, sigma) in bends_mm.items()]
     return remark(
-        f"the board is bent by {' and '.join(bends)}; {_taken(modelled)}", "fix the board to glass or a stiff plate"
+        f"the board is bent by {' and '.join(bends)}; {_taken_text(modelled)}",
+        "fix the board to glass or a stiff plate",
     )
 
 
 def unequal_squares(*, stretch: float, sigma: float, modelled: bool) -> Remark:
     return remark(
         f"the squares are {100.0 * abs(stretch):.2f} ± {100.0 * sigma:.2f} % {'wider' if stretch > 0 else 'narrower'} than "
-        f"high; {_taken(modelled)}",
+        f"high; {_taken_text(modelled)}",
         "measure ten squares along a row and along a column, and print without scaling to the page",
     )
 
 
-def _taken(modelled: bool) -> str:
+def _taken_text(modelled: bool) -> str:
     return "this was taken into account" if modelled else "this was not taken into account: no lens model fits with it"
 
 
@@ -178,18 +179,18 @@ def too_few_views(*, views: int, needed: int, left_out: Sequence["LeftOutImage"]
 
 def parallel_views(*, turned_deg: float, focal_px: float, sigma: float) -> Remark:
     return remark(
-        f"the board is turned by {turned_deg:.0f} deg at most from view to view; {_known(focal_px, sigma)}", _FILM
+        f"the board is turned by {turned_deg:.0f} deg at most from view to view; {_known_text(focal_px, sigma)}", _FILM
     )
 
 
 def unknown_focal_length(*, focal_px: float, sigma: float, rms_px: float, model: str) -> Remark:
     return remark(
-        f"{_known(focal_px, sigma)}; the corners fit to {rms_px:.2f} px",
+        f"{_known_text(focal_px, sigma)}; the corners fit to {rms_px:.2f} px",
         f"check the board and the lens model ({model}), and {_FILM}",
     )
 
 
-def _known(focal_px: float, sigma: float) -> str:
+def _known_text(focal_px: float, sigma: float) -> str:
     return f"the focal length, {focal_px:.0f} px, is known to {100.0 * sigma:.0f} %"
 
 

@@ -10,8 +10,8 @@ from calib_core.results.verdict import SURE_PAIRS
 from calib_core.words import intrinsics, proposing
 from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.text import Words, join, option, say, sentence
-from calib_core.words.unpaired import unpaired_told
-from calib_core.words.warnings import told
+from calib_core.words.unpaired import unpaired_remark
+from calib_core.words.warnings import warning_remark
 
 _INTRINSICS = (
     "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this image "
@@ -155,18 +155,18 @@ OUTCOMES: Mapping[str, Row] = {
 }
 
 
-def outcome_told(outcome: Unsolvable) -> Remark:
+def outcome_remark(outcome: Unsolvable) -> Remark:
     """Return why there is no calibration, and what to do: first about what looks wrong with the input."""
     own = by_row(outcome, OUTCOMES)
-    causes = [join((cause.message, cause.hint), "; ") for cause in map(told, outcome.suspected)]
+    causes = [join((cause.message, cause.hint), "; ") for cause in map(warning_remark, outcome.suspected)]
     return Remark(own.message, join((*causes, own.hint), "; "), own.action)
 
 
 def remark_on(stated: DataWarning | Unsolvable | Unpaired) -> Remark:
     """Return what is said of any of them."""
     if isinstance(stated, DataWarning):
-        return told(stated)
-    return unpaired_told(stated) if isinstance(stated, Unpaired) else outcome_told(stated)
+        return warning_remark(stated)
+    return unpaired_remark(stated) if isinstance(stated, Unpaired) else outcome_remark(stated)
 
 
 def said_of(stated: DataWarning | Unsolvable | Unpaired) -> Words:
@@ -210,7 +210,7 @@ class WarningText:
 
 def warning_text(warning: DataWarning) -> WarningText:
     """Return a warning for a file: pairs by their ids, options by their names."""
-    said = told(warning)
+    said = warning_remark(warning)
     return WarningText(warning.code, str(said.message), str(said.hint))
 
 
@@ -238,5 +238,5 @@ class UnpairedText:
 
 def unpaired_text(click: Unpaired) -> UnpairedText:
     """Return such a click for a file."""
-    said = unpaired_told(click)
+    said = unpaired_remark(click)
     return UnpairedText(click.id, click.code, str(said.message), str(said.hint))

@@ -4,7 +4,7 @@ from calib_core.measurements import DataWarning, Facts
 from calib_core.results.actions import MeasureCameraPosition
 from calib_core.words.remark import Remark, by_code, remark
 from calib_core.words.text import count, option, say
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 
 
 def no_frames() -> Remark:
@@ -54,7 +54,8 @@ def not_confident(
 ) -> Remark:
     if contradiction is not None:
         return remark(
-            "the clicks are unconfirmed, and the pose from them is contradictory: " + told(contradiction).message,
+            "the clicks are unconfirmed, and the pose from them is contradictory: "
+            + warning_remark(contradiction).message,
             "open the recording on the page and confirm what it proposes, from one click on",
         )
     if camera_away_m:

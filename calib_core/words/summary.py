@@ -8,7 +8,7 @@ from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.calibration import Calibration
 from calib_core.results.radar_axes import RadarAxesSigma, sigma_in_radar_axes
 from calib_core.results.verdict import Verdict
-from calib_core.words.outcomes import outcome_told, said_of
+from calib_core.words.outcomes import outcome_remark, said_of
 from calib_core.words.systematic_errors import dominance_text
 from calib_core.words.verdict import action_words, verdict_line
 
@@ -25,7 +25,7 @@ def _(click: Unpaired) -> str:
 
 @in_words.register
 def _(outcome: Unsolvable) -> str:
-    one = outcome_told(outcome)
+    one = outcome_remark(outcome)
     return "\n  ".join((f"No calibration ({outcome.code}): {one.message}", str(one.hint), *map(str, outcome.unpaired)))
 
 

@@ -44,10 +44,10 @@ class Words:
         return bool(self.parts)
 
     def __add__(self, more: "Words | str") -> "Words":
-        return _joined((*self.parts, *words(more).parts))
+        return _merge_strings((*self.parts, *words(more).parts))
 
     def __radd__(self, before: str) -> "Words":
-        return _joined((before, *self.parts))
+        return _merge_strings((before, *self.parts))
 
     def __str__(self) -> str:
         return self.text()
@@ -98,7 +98,7 @@ def sentence(phrase: "Words | str") -> Words:
         parts[0] = (first[:1].upper() if begins else first[:1]) + first[1:]
     if not isinstance(last := parts[-1], str) or last.rstrip()[-1:] not in (".", "!", "?", "…"):
         parts.append(".")
-    return _joined(parts)
+    return _merge_strings(parts)
 
 
 def words(text: Words | str) -> Words:
@@ -120,10 +120,10 @@ def say(template: str, /, **values: object) -> Words:
             continue
         value = values[name]
         parts.extend(value.parts if isinstance(value, Words) else (format(value, spec or ""),))
-    return _joined(parts)
+    return _merge_strings(parts)
 
 
-def _joined(parts: Iterable[Part]) -> Words:
+def _merge_strings(parts: Iterable[Part]) -> Words:
     """Merge neighbouring strings, so that equal words have equal parts."""
     merged: list[Part] = []
     for part in parts:

@@ -71,6 +71,6 @@ def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
 UNPAIRED = by_code(chosen_return_missing, no_scan, no_static_return, no_z_score_inlier, nothing_in_range)
 
 
-def unpaired_told(click: Unpaired) -> Remark:
+def unpaired_remark(click: Unpaired) -> Remark:
     """Return why a click has no radar position, and what to do."""
     return by_row(click, UNPAIRED)

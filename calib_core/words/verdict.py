@@ -24,11 +24,11 @@ from calib_core.results.actions import (
     Stop,
 )
 from calib_core.results.verdict import SURE_PAIRS, Assumed, StatedError, Verdict, VerdictLevel
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from calib_core.words.remark import Remark
 from calib_core.words.systematic_errors import remedy_of
 from calib_core.words.text import Words, join, listed, option, words
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 
 _CORNER = "the inner corner, where the three plates meet"
 
@@ -97,7 +97,7 @@ def reason(verdict: Verdict) -> Words:
         return words(
             f"{verdict.unconfirmed} of the recording's units or axes {'is' if one else 'are'} assumed, not confirmed"
         )
-    cause = None if verdict.cause is None else cause_told(verdict).message
+    cause = None if verdict.cause is None else cause_remark(verdict).message
     if verdict.level in ("contradictory", "nothing"):
         return cause or words("no placement is clicked")
     if verdict.error is None:
@@ -110,9 +110,11 @@ def reason(verdict: Verdict) -> Words:
     return join((cause or few, f"within {error}"), "; ")
 
 
-def cause_told(verdict: Verdict) -> Remark:
+def cause_remark(verdict: Verdict) -> Remark:
     """Return what a verdict's cause says."""
-    return outcome_told(verdict.cause) if isinstance(verdict.cause, Unsolvable) else told(_warning_of(verdict))
+    return (
+        outcome_remark(verdict.cause) if isinstance(verdict.cause, Unsolvable) else warning_remark(_warning_of(verdict))
+    )
 
 
 def _warning_of(verdict: Verdict) -> DataWarning:
@@ -123,7 +125,7 @@ def _warning_of(verdict: Verdict) -> DataWarning:
 def action_of(verdict: Verdict) -> Action:
     """Return what a verdict advises, with "do what the hint says" and "learn more of an error" resolved."""
     if isinstance(verdict.action, FollowHint):
-        return cause_told(verdict).action or verdict.action
+        return cause_remark(verdict).action or verdict.action
     if isinstance(verdict.action, ReduceError):
         return remedy_of(verdict.action.name, measured=verdict.action.measured).action
     return verdict.action
@@ -132,7 +134,7 @@ def action_of(verdict: Verdict) -> Action:
 def action_words(verdict: Verdict) -> Words:
     """Return the one thing to do, as a sentence without a full stop."""
     follows = isinstance(verdict.action, FollowHint)
-    best = capitalized(cause_told(verdict).hint) if follows else words_of(verdict.action)
+    best = capitalized(cause_remark(verdict).hint) if follows else words_of(verdict.action)
     return join(
         ("Done with this recording: every placement is clicked" if verdict.everything_clicked else "", best), ". "
     )

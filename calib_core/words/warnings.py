@@ -354,7 +354,7 @@ def two_poses(
         return remark(
             say(
                 "pose ambiguity: another pose, {away}, explains the pairs as well; {count} of {pairs} agree on it: {ids}",
-                away=_away(away_deg, away_cm),
+                away=_away_text(away_deg, away_cm),
                 count=len(agreeing),
                 pairs=pairs,
                 ids=listed(agreeing),
@@ -364,7 +364,7 @@ def two_poses(
         )
     if probability:
         return remark(
-            f"pose ambiguity: another pose, {_away(away_deg, away_cm)}, may be the right one (probability "
+            f"pose ambiguity: another pose, {_away_text(away_deg, away_cm)}, may be the right one (probability "
             f"{100 * probability:.0f} %); it is not clear which of the pairs are wrong",
             nearer,
             MeasureCameraPosition(),
@@ -384,11 +384,11 @@ def two_poses(
     )
 
 
-def _away(away_deg: float, away_cm: float) -> str:
+def _away_text(away_deg: float, away_cm: float) -> str:
     return f"{away_deg:.1f} deg and {away_cm:.0f} cm away"
 
 
-def _away_sigmas(away_deg: float, away_cm: float, sigmas: float) -> str:
+def _away_text_in_sigmas(away_deg: float, away_cm: float, sigmas: float) -> str:
     return f"{away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} σ)"
 
 
@@ -418,7 +418,7 @@ def camera_far_away(
             SetOption("solving.nominal_camera_distance_m"),
         )
     return remark(
-        f"another pose, {_away_sigmas(away_deg, away_cm, sigmas)}, explains the pairs as well; the one with the camera "
+        f"another pose, {_away_text_in_sigmas(away_deg, away_cm, sigmas)}, explains the pairs as well; the one with the camera "
         f"{here_m:.1f} m from the radar, not {there_m:.1f} m, was chosen only because about {expected_m:g} m is expected",
         say(
             "are both sensors on the same rig, or how far apart? Set {distance}, or measure the camera position",
@@ -722,7 +722,9 @@ def damaged_recording(*, lost: int, damage: DataWarning) -> Remark:
     clicks = f"{count(lost, 'click')} {'has' if lost == 1 else 'have'}"
     return remark(
         say(
-            "{clicks} no radar data, and the recording is damaged: {damage}", clicks=clicks, damage=told(damage).message
+            "{clicks} no radar data, and the recording is damaged: {damage}",
+            clicks=clicks,
+            damage=warning_remark(damage).message,
         ),
         "copy the recording again from its source",
     )
@@ -824,6 +826,6 @@ SOLVER = by_code(
 ROWS: Mapping[str, Row] = {**SOLVER, **intrinsics.WARNINGS, **evaluation.WARNINGS, **by_code(no_camera)}
 
 
-def told(warning: DataWarning) -> Remark:
+def warning_remark(warning: DataWarning) -> Remark:
     """Return what a warning says: by its row, or as it was reported with it."""
     return by_row(warning, ROWS)

@@ -43,7 +43,7 @@ from calib_core.results import Calibration
 from calib_core.results.actions import SetOption
 from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.results.verdict import verdict_on
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from calib_core.words.text import OptionPart
 
 START_NS = 1_700_000_000_123_456_789
@@ -529,7 +529,7 @@ def test_when_ransac_finds_nothing_the_hint_names_the_threshold_and_the_default_
     outcome = unsolvable(solve_pairs_as_printed(pairs, study_camera(), strict))
     assert outcome.code == "no-consensus"
     assert outcome.facts == {"pairs": 20, "threshold_px": 0.05}
-    remark = outcome_told(outcome)
+    remark = outcome_remark(outcome)
     assert remark.action == SetOption("method", "default")
     assert OptionPart("paper.ransac_threshold_px") in remark.hint.parts
 

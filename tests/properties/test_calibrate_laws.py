@@ -13,7 +13,7 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 SEEDS = st.integers(0, 10_000)
@@ -85,7 +85,7 @@ def test_any_number_of_pairs_gives_an_answer_or_a_reason(seed, count):
     pairs = simulate_pairs(6, rng=np.random.default_rng(seed), outlier_share=0.5).pairs[:count]
     outcome = calibrate_pairs(pairs, simulate_pairs(1, rng=np.random.default_rng(0)).camera, CalibrationOptions())
     if isinstance(outcome, Unsolvable):
-        remark = outcome_told(outcome)
+        remark = outcome_remark(outcome)
         assert outcome.code
         assert remark.message
         assert remark.hint

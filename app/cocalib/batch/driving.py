@@ -76,7 +76,7 @@ def drive(
     folder.mkdir(parents=True, exist_ok=True)
     calls = [(job, folder) for job in left]
     try:
-        with closing(engine.run_all(run_once, calls, lambda number: _died(left[number], folder))) as outcomes:
+        with closing(engine.run_all(run_once, calls, lambda number: _worker_died(left[number], folder))) as outcomes:
             for finished, (_, outcome) in enumerate(outcomes, start=1):
                 found[outcome.digest] = outcome
                 done += times[outcome.digest]
@@ -87,7 +87,7 @@ def drive(
     return tuple(found[job.digest] for job in jobs)
 
 
-def _died(job: Job, results: Path) -> Outcome:
+def _worker_died(job: Job, results: Path) -> Outcome:
     return failed_outcome(job, results, reason=_DIED, hint=_DIED_HINT)
 
 

@@ -64,7 +64,7 @@ class InputPath:
         if self.role == "camera" and "#" in str(path) and not path.exists():  # FILE#CAMERA
             path = Path(str(path).rpartition("#")[0])
         path.stat()
-        paths = list(_within(path)) if path.is_dir() else [path]
+        paths = list(_files_below(path)) if path.is_dir() else [path]
         if self.role == "recording":
             paths += [side for side in _side_files(path) if side not in paths and side.is_file()]
         for file in paths:
@@ -103,7 +103,7 @@ def state_of(inputs: tuple[InputPath, ...]) -> str:
     return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
 
 
-def _within(folder: Path) -> Iterator[Path]:
+def _files_below(folder: Path) -> Iterator[Path]:
     """Yield the files of a folder and the folders below, without hidden ones and without sessions of the page.
 
     Raises:
@@ -184,7 +184,7 @@ class InputDigests:
         for path, one in {f"{one.role} {one.path}": one for one in inputs}.items():
             try:
                 files = one.files()
-                if self._known(path, files)[1] is None:
+                if self._cached_digest(path, files)[1] is None:
                     self._total += sum(file.path.stat().st_size for file in files)
             except OSError:
                 continue
@@ -197,7 +197,7 @@ class InputDigests:
         """
         key = f"{given.role} {given.path}"
         files = given.files()
-        state, known = self._known(key, files)
+        state, known = self._cached_digest(key, files)
         if known is not None:
             return known
         digest = hashlib.sha256()
@@ -225,7 +225,7 @@ class InputDigests:
         document = _Document(_SCHEMA, {**self._read(), **self._new})
         self._results.write(_FILE, data=msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
 
-    def _known(self, key: str, files: Sequence[InputFile]) -> tuple[str, str | None]:
+    def _cached_digest(self, key: str, files: Sequence[InputFile]) -> tuple[str, str | None]:
         state = _state(files)[0]
         kept = self._new.get(key) or self._kept.get(key)
         return state, kept.digest if kept is not None and kept.state == state else None

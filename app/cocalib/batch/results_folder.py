@@ -98,7 +98,7 @@ class ResultsFolder:
             OSError: it cannot be read.
         """
         try:
-            with self._opened(*names[:-1]) as folder:
+            with self._open_below(*names[:-1]) as folder:
                 return folder.read(names[-1])
         except (FileNotFoundError, NotADirectoryError):
             return None
@@ -114,11 +114,11 @@ class ResultsFolder:
             CalibrationError: what has this name is not a regular file, or a folder above it is a link; nothing was written.
             OSError: it cannot be written.
         """
-        with self._opened(*names[:-1], create=True) as folder:
+        with self._open_below(*names[:-1], create=True) as folder:
             folder.replace(names[-1], data)
 
     @contextmanager
-    def _opened(self, *names: str, create: bool = False) -> Iterator[GuardedFolder]:
+    def _open_below(self, *names: str, create: bool = False) -> Iterator[GuardedFolder]:
         """Open a folder below this one; none of the names may be a link."""
         here = self.path.resolve()
         if not create:
@@ -140,13 +140,13 @@ class ResultsFolder:
             OSError: it cannot be written.
         """
         writer = Writer.this()
-        with self._opened(RESULTS, create=True):
+        with self._open_below(RESULTS, create=True):
             parent = self.folder_of(digest).parent
         unfinished = parent / writer.folder_name(digest)
         unfinished.mkdir()
         try:
             yield unfinished
-            self._put(unfinished, digest, writer)
+            self._put_in_place(unfinished, digest, writer)
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
 
@@ -159,7 +159,7 @@ class ResultsFolder:
         parent = self.folder_of("")
         if not parent.is_dir():
             return 0
-        with self._opened(RESULTS):
+        with self._open_below(RESULTS):
             left = [
                 one for one in parent.iterdir() if one.name.startswith(".") and _is_folder(one) and is_abandoned(one)
             ]
@@ -167,7 +167,7 @@ class ResultsFolder:
                 shutil.rmtree(folder, ignore_errors=True)
         return len(left)
 
-    def _put(self, unfinished: Path, digest: str, writer: "Writer") -> None:
+    def _put_in_place(self, unfinished: Path, digest: str, writer: "Writer") -> None:
         """Give a result its name. A folder of that name is moved away first; another process may do the same."""
         final = self.folder_of(digest)
         for _ in range(_ATTEMPTS):
@@ -193,7 +193,7 @@ class ResultsFolder:
     def _sha256(self, digest: str, name: str) -> str:
         *folders, last = name.split("/")
         with (
-            self._opened(RESULTS, digest, *folders) as folder,
+            self._open_below(RESULTS, digest, *folders) as folder,
             os.fdopen(folder.open(last, os.O_RDONLY), "rb") as file,
         ):
             return _sha256(file)

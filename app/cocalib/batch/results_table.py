@@ -147,7 +147,7 @@ def _row(results: ResultsFolder, vehicle: str, session: str, digest: str) -> Ses
 
 def _of_outcome(row: SessionRow, outcome: Outcome) -> SessionRow:
     shared = ("status", "verdict", "aed_px", "pairs", "reason", "hint")
-    return replace(row, recorded=_recorded(outcome.recorded_ns), **{name: getattr(outcome, name) for name in shared})
+    return replace(row, recorded=_iso_time(outcome.recorded_ns), **{name: getattr(outcome, name) for name in shared})
 
 
 def _calibration(results: ResultsFolder, outcome: Outcome) -> Calibration:
@@ -172,15 +172,18 @@ def _with_pose(row: SessionRow, calibration: Calibration) -> SessionRow:
     pose, error = calibration.camera_from_radar, stated_error(calibration)
     qw, qx, qy, qz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
     x_m, y_m, z_m = pose.translation_m.tolist()
-    stated = {"rotation_95_deg": _known(error.rotation_deg), "position_95_cm": _known(error.position_cm)}
+    stated = {
+        "rotation_95_deg": _finite_or_none(error.rotation_deg),
+        "position_95_cm": _finite_or_none(error.position_cm),
+    }
     return replace(row, **stated, qw=qw, qx=qx, qy=qy, qz=qz, x_m=x_m, y_m=y_m, z_m=z_m)
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _recorded(recorded_ns: int | None) -> str | None:
+def _iso_time(recorded_ns: int | None) -> str | None:
     """Return a stamp as ISO 8601 in UTC; None if it is not known, or no calendar has it."""
     if recorded_ns is None:
         return None

@@ -23,7 +23,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import InputFile
 from calib_core.results.verdict import verdict_on
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from calib_core.words.verdict import stated_verdict
 from cocalib.batch.inputs import all_reached, inputs_of, state_of
 from cocalib.batch.job import Job
@@ -154,11 +154,11 @@ def run_job(job: Job, results: Path) -> Outcome:
         if state_of(inputs) == state:
             log = "\n\n".join(result.log)
             files = {**result.files, **({LOG_FILE: log.encode(errors="backslashreplace")} if log else {})}
-            return _kept(replace(outcome, run=run()), files, job, results)
-    return replace(failed(job, _changed(job)), run=run())
+            return _write_outcome(replace(outcome, run=run()), files, job, results)
+    return replace(failed(job, _changed_input(job)), run=run())
 
 
-def _kept(outcome: Outcome, files: Mapping[str, bytes], job: Job, results: Path) -> Outcome:
+def _write_outcome(outcome: Outcome, files: Mapping[str, bytes], job: Job, results: Path) -> Outcome:
     """Write the result; return its outcome with the files listed, or that it cannot be written."""
     try:
         with ResultsFolder(results).writing(job.digest) as folder:
@@ -188,7 +188,7 @@ class Failure:
     is_final: bool = False
 
 
-def _changed(job: Job) -> Failure:
+def _changed_input(job: Job) -> Failure:
     return Failure(
         f"{job.row.name}: an input changed after the batch was started, so nothing is kept",
         "run the batch again once the files are complete",
@@ -404,7 +404,7 @@ def outcome_of(job: Job, result: SessionResult) -> Outcome:
         return replace(failed(job, solved), recorded_ns=result.recorded_ns)
     if isinstance(solved, Unsolvable):
         refused = _outcome(job, "refused")
-        said = outcome_told(solved)
+        said = outcome_remark(solved)
         return replace(refused, reason=str(said.message), hint=str(said.hint), recorded_ns=result.recorded_ns)
     assert solved is not None, "the steps end with an answer or a failure"
     return replace(

@@ -18,10 +18,10 @@ from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 from cocalib.solving.recorded_clicks import (
     SPEED_UNIT,
-    about_speed_unit,
     clicks_in_recording,
     file_of_clicks,
     require_confirmed,
+    speed_unit_notes,
 )
 from cocalib.solving.solving import calibration_text, required_camera
 
@@ -93,11 +93,11 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
         return Unsolvable("no-clicks")
     camera = required_camera(recording, given.camera)
     notes = [f"radar: {recording.radar_choice}"] if recording.radar_choice else []
-    placed = _placed(row, given.clicks, recording, camera, notes)
+    placed = _clicks_to_solve(row, given.clicks, recording, camera, notes)
     if isinstance(placed, Unsolvable):
         return placed
     outcome = solve_placed_clicks(recording, placed, camera, row.options)
-    notes.extend(about_speed_unit(recording, placed.clicks, camera, row.options, outcome))
+    notes.extend(speed_unit_notes(recording, placed.clicks, camera, row.options, outcome))
     if isinstance(outcome, Unsolvable):
         return outcome
     text = _calibration_text(row, outcome, recording, given, placed)
@@ -112,7 +112,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     return SolvedSession(outcome, calibration, clicks, files, tuple(notes))
 
 
-def _placed(
+def _clicks_to_solve(
     row: ManifestRow, file: ClicksFile | None, recording: Recording, camera: Camera, notes: list[str]
 ) -> PlacedClicks | Unsolvable:
     """Return the clicks to solve with: those of the file, and with auto the ones that are placed automatically."""

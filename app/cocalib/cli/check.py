@@ -70,7 +70,7 @@ class Check:
         evidence = self._evidence()
         compared = None
         if self.recording and evidence.against is not None:
-            compared, lens = self._compared(evidence)
+            compared, lens = self._compare_on_recording(evidence)
             evidence = replace(evidence, camera=evidence.camera or lens)
         checked = [self._checked(path, evidence) for path in self.calibration]
         if self.junit is not None:
@@ -171,7 +171,7 @@ class Check:
             known = replace(report, results=(*report.results, *stale, *lens))
             return with_recording(known, str(path), recording, clicks, camera=camera or recording.camera())
 
-    def _compared(self, evidence: "_Evidence") -> "tuple[ComparedOnRecording, Camera]":
+    def _compare_on_recording(self, evidence: "_Evidence") -> "tuple[ComparedOnRecording, Camera]":
         """Judge both calibrations by the same clicks and boxes of the recording, that of --against as A; also return its lens."""
         from cocalib.evaluation.comparing import compare_on_recording
         from cocalib.evaluation.recording_check import judged_calibration

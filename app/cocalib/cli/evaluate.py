@@ -125,12 +125,12 @@ class Evaluate:
             clicks, boxes, labels = self.judging.evidence.found_in(
                 recording, self.judging.recording, [judged.found], path.name
             )
-            evaluation = self._evaluated(judged.calibration, recording, clicks, boxes, labels, options)
+            evaluation = self._evaluate(judged.calibration, recording, clicks, boxes, labels, options)
             tell_choices(recording)
             found = replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
             return judged.found, judged.calibration, found
 
-    def _evaluated(
+    def _evaluate(
         self,
         calibration: "Calibration",
         recording: "Recording",
@@ -210,9 +210,9 @@ class Evaluate:
             subject = replace(subject_of(found, calibration, name), recording=seen)
             if calibration is None:
                 return subject, ()
-            return self._judged(subject, calibration, other, recording)
+            return self._subject_of(subject, calibration, other, recording)
 
-    def _judged(
+    def _subject_of(
         self,
         subject: "ReportSubject",
         calibration: "Calibration",
@@ -229,7 +229,7 @@ class Evaluate:
         boxes, labels = self.judging.evidence.boxes_in(recording)
         if not clicks and boxes is None:
             return subject, ()
-        evaluation = self._evaluated(calibration, recording, clicks, boxes, labels, options)
+        evaluation = self._evaluate(calibration, recording, clicks, boxes, labels, options)
         subject = replace(subject, judged=RecordingEvidence(evaluation, clicks))
         if other is None or self.against is None:
             return subject, ()

@@ -88,7 +88,7 @@ class Export:
         renamed = self.frames.renamed(file)
         written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
         if self.out is not None:
-            told = _written(self.out, written)
+            told = _write_files(self.out, written)
         elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
         elif written.extra_files:
@@ -129,7 +129,7 @@ class Export:
         return code
 
 
-def _written(out: Path, written: "Written") -> list[str]:
+def _write_files(out: Path, written: "Written") -> list[str]:
     """Write the files of an export; return what to say of them."""
     target = out / written.file_name if out.is_dir() else out
     files = {target: written.data} | {target.parent / extra.file_name: extra.data for extra in written.extra_files}
@@ -206,7 +206,7 @@ def _into_recording(file: "CalibrationFile", paths: Sequence[Path], out: Path, *
     if out.suffix.lower() != ".mcap":
         raise InputError(f"{out}: the new recording is an MCAP file; name it NAME.mcap")
     layout = out.with_name(out.stem + _LAYOUT_ENDING)
-    with _opened(paths, topics, file.provenance) as recording:
+    with _open_recording(paths, topics, file.provenance) as recording:
         writable(layout)
         require_room(out, sum(source.size_bytes for source in recording.sources))
         with writing_whole(out) as stream, progress_bar("writing messages") as progress:
@@ -216,7 +216,7 @@ def _into_recording(file: "CalibrationFile", paths: Sequence[Path], out: Path, *
     return 0
 
 
-def _opened(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance") -> "Recording":
+def _open_recording(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance") -> "Recording":
     """Open the recording with the topics and columns of the calibration, unless the user names others."""
     from calib_core.recordings import open_recording
 
@@ -239,11 +239,11 @@ def _opened(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance")
 
 def _report(recording: "Recording", written: "RecordingWritten", out: Path, layout: Path) -> None:
     """Print what was written, what was added, and what was lost."""
-    from calib_core.recordings import about_assumptions
+    from calib_core.recordings import assumption_warnings
 
     for note in written.notes:
         print(f"note: {note}", file=sys.stderr)
-    for warning in about_assumptions(recording.assumptions):
+    for warning in assumption_warnings(recording.assumptions):
         print(f"note: {said_of(warning)}", file=sys.stderr)
     lost = sum(written.lost.values())
     if lost:

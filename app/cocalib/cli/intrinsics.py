@@ -169,7 +169,7 @@ class Intrinsics:
                     lines = () if isinstance(found, Unsolvable) else left_out_lines(found.left_out)
                     print("".join(f"  {line}\n" for line in lines), end="", file=sys.stderr)
                     return code
-                lens = replace(lens, warnings=(*lens.warnings, *_about_series(images)))
+                lens = replace(lens, warnings=(*lens.warnings, *_series_warnings(images)))
                 return self._deliver(lens, found, search, images)
 
     def _deliver(
@@ -239,7 +239,7 @@ def _file_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]+", "_", Path(name).stem).strip("_") or "image"
 
 
-def _about_series(images: "OpenImages") -> "Iterator[DataWarning]":
+def _series_warnings(images: "OpenImages") -> "Iterator[DataWarning]":
     """Warn if the files given are perhaps of several cameras."""
     from calib_core.results import DataWarning
     from cocalib.intrinsics.image_sources import FileImages, series_of

@@ -148,11 +148,11 @@ def tell_choices(recording: "Recording") -> None:
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
-    from calib_core.words.warnings import told
+    from calib_core.words.warnings import warning_remark
 
     _tell_notes(recording.radar_clock_notes)
     doubted = [warning for warning in recording.warnings if warning.code in _OF_FRAMES]
-    _tell_notes([str(told(warning).message) for warning in (*doubted, *recording.damage)])
+    _tell_notes([str(warning_remark(warning).message) for warning in (*doubted, *recording.damage)])
 
 
 def _tell_notes(notes: Sequence[str]) -> None:

@@ -38,7 +38,7 @@ def proposal_lines(
         for name, one in named_proposals(proposals, views, confirmed)
     ]
     return [
-        *(_aligned([_HEAD, *rows]) if rows else []),
+        *(_table_lines([_HEAD, *rows]) if rows else []),
         *unproposed_lines(proposals, origin),
         _summary(proposals, confirmed),
     ]
@@ -53,7 +53,7 @@ def unproposed_lines(proposals: Proposals, origin: TimeNs) -> list[str]:
     ]
 
 
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def _table_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Lay out rows in columns: figures to the right, the id and the last column to the left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

@@ -105,7 +105,7 @@ class Session:
         assert self.out is not None
         found = inspect_session(folder)
         write_whole(self.out, write_clicks(found.clicks))
-        print(_printable(f"{_counted(len(found.clicks), 'click')} of {found.recording} written to {self.out}"))
+        print(_printable(f"{_click_count(len(found.clicks), 'click')} of {found.recording} written to {self.out}"))
         if not found.is_complete or found.torn_bytes:
             print(_printable("\n".join(f"cocalib: {line}" for line in _findings(found))), file=sys.stderr)
         return 0 if found.is_complete else 3
@@ -135,10 +135,10 @@ def _findings(found: "Repair") -> list[str]:
     """Return what a session proves and what is wrong with it, line by line."""
     lines = [f"{found.folder}: session of {found.recording}", *(f"  {fault}" for fault in found.faults)]
     lines.append(
-        f"  proven: {_counted(len(found.clicks), 'click')}, from {_counted(found.steps, 'step')} of the journal"
+        f"  proven: {_click_count(len(found.clicks), 'click')}, from {_click_count(found.steps, 'step')} of the journal"
     )
     if found.unproven:
-        lines.append(f"  not proven, and left out: {_counted(found.unproven, 'line')} of the journal")
+        lines.append(f"  not proven, and left out: {_click_count(found.unproven, 'line')} of the journal")
     elif found.faults and found.is_complete:
         lines.append("  as far as the files show, no click is missing")
     elif found.faults:
@@ -148,7 +148,7 @@ def _findings(found: "Repair") -> list[str]:
     return lines
 
 
-def _counted(count: int, what: str) -> str:
+def _click_count(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 

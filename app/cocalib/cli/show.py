@@ -89,7 +89,7 @@ class Show:
         if Show(out=out, recorded=self.recorded, output=self.output) != self:
             raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
         from calib_core.recordings import video_format, write_video
-        from calib_core.words.warnings import told
+        from calib_core.words.warnings import warning_remark
         from cocalib.solving.recorded_clicks import seconds_text
 
         video_format(out)
@@ -102,7 +102,7 @@ class Show:
         print(f"{out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):
-                print(told(warning).message)
+                print(warning_remark(warning).message)
         for note in written.skipped.notes():
             print(note)
         return 0

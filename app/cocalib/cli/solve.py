@@ -155,7 +155,7 @@ class Solve:
 
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from cocalib.solving.automatic import solve_placed_clicks
-        from cocalib.solving.recorded_clicks import SPEED_UNIT, about_speed_unit, require_confirmed
+        from cocalib.solving.recorded_clicks import SPEED_UNIT, require_confirmed, speed_unit_notes
         from cocalib.solving.solving import calibration_text, required_camera
 
         self._require_folders()
@@ -166,11 +166,11 @@ class Solve:
             require_confirmed(recording, but=SPEED_UNIT)
             tell_choices(recording)
             camera = required_camera(recording, camera_file)
-            placed = self._placed(file, recording, camera, options)
+            placed = self._clicks_to_solve(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
                 return explain_unsolvable(placed)
             outcome = solve_placed_clicks(recording, placed, camera, options)
-            for note in about_speed_unit(recording, placed.clicks, camera, options, outcome):
+            for note in speed_unit_notes(recording, placed.clicks, camera, options, outcome):
                 print(f"note: {note}", file=sys.stderr)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
@@ -200,7 +200,7 @@ class Solve:
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
 
-    def _placed(
+    def _clicks_to_solve(
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
     ) -> "PlacedClicks | Unsolvable":
         """Return the clicks to solve with: those of the file, and with --auto the ones that are placed automatically."""

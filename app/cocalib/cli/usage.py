@@ -52,9 +52,9 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
         case UnknownArgument(token):
             return _unknown(token, kind)
         case MissingArguments(arguments):
-            return f"{' and '.join(map(_typed, arguments))} {'is' if len(arguments) == 1 else 'are'} missing"
+            return f"{' and '.join(map(_argument_text, arguments))} {'is' if len(arguments) == 1 else 'are'} missing"
         case MissingValue(argument):
-            return f"{argument.name} needs a value: {_typed(argument)}"
+            return f"{argument.name} needs a value: {_argument_text(argument)}"
         case WrongChoice(argument, value, choices) if near := get_close_matches(value.lower(), choices, n=1):
             return f"{argument.name} {value}: did you mean {near[0]}?"
         case WrongChoice(argument, value, choices):
@@ -67,7 +67,7 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             )
 
 
-def _typed(argument: Argument) -> str:
+def _argument_text(argument: Argument) -> str:
     """Return an argument as typed: `--out FILE`, or `RECORDING...`."""
     return f"{argument.name} {argument.value}".rstrip()
 

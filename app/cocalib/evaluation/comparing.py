@@ -97,7 +97,7 @@ def compare_on_recording(
         residuals = residual_difference(a.residuals, b.residuals, lost_px=float(np.hypot(*sizes[0])))
     if a.boxes is not None and b.boxes is not None:
         acc = acc_difference(a.boxes, b.boxes)
-    fitted_a, fitted_b = (_fitted(calibration, clicks) for calibration in calibrations)
+    fitted_a, fitted_b = (_solved_from_clicks(calibration, clicks) for calibration in calibrations)
     return ComparedOnRecording(names, a, b, residuals, acc, (fitted_a, fitted_b))
 
 
@@ -202,7 +202,7 @@ def _interval(difference: PairedDifference, factor: float, unit: str, group: str
     return f" (95 %: {low:+.3g} to {high:+.3g} {unit}, {difference.groups} {group}s, p = {difference.p_value:.2g})"
 
 
-def _fitted(calibration: Calibration, clicks: Sequence[ReflectorClick]) -> bool:
+def _solved_from_clicks(calibration: Calibration, clicks: Sequence[ReflectorClick]) -> bool:
     """Return whether a calibration was solved from these very clicks."""
     used = {
         (int(pair.image_time), *pair.pixel_px.tolist())

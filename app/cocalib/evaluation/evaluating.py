@@ -130,18 +130,18 @@ def evidence_in(
     """
     options = options or EvidenceOptions()
     pairs, unpaired = _pairs(recording, clicks, camera, options.solving)
-    lost = _lost(unpaired) if pairs is None and clicks else ()
+    lost = _lost_click_warnings(unpaired) if pairs is None and clicks else ()
     if boxes is None:
         return Evidence(pairs, unpaired, None, lost)
     _require_camera(boxes, camera)
-    lost = (*lost, *_taken(boxes, options.classes))
+    lost = (*lost, *_box_warnings(boxes, options.classes))
     if labels is not None or _have_cuboids(boxes):
         reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
         scans = recording.radar_scans_around(boxes.times_ns.tolist(), reach_s + 1e-3)
         returns = counted_returns(
             camera, scans, boxes, labels, classes=options.classes, max_gap_s=options.max_gap_s or reach_s
         )
-        return Evidence(pairs, unpaired, returns, (*lost, *_about(returns)))
+        return Evidence(pairs, unpaired, returns, (*lost, *_warnings_on(returns)))
     if too_sparse := _too_sparse(recording.radar_times, boxes):
         return Evidence(pairs, unpaired, None, (*lost, *too_sparse))
     targets = find_targets(_windows(recording, boxes), options.targets, progress=progress)
@@ -149,7 +149,7 @@ def evidence_in(
     returns = counted_returns(
         camera, stamps, boxes, targets.tracks, classes=options.classes, max_gap_s=options.max_gap_s
     )
-    return Evidence(pairs, unpaired, returns, (*lost, *targets.moving.warnings, *_about(returns)))
+    return Evidence(pairs, unpaired, returns, (*lost, *targets.moving.warnings, *_warnings_on(returns)))
 
 
 def judged(
@@ -176,7 +176,7 @@ def judged(
     if found.returns is not None:
         pose, lens = calibration.camera_from_radar, calibration.camera
         boxes = judged_by_boxes(pose, lens, found.returns, radar_errors=calibration.radar_errors, progress=progress)
-        warnings += _turned(calibration, found.returns)
+        warnings += _turned_warnings(calibration, found.returns)
     return Evaluation(residuals, boxes, tuple(warnings))
 
 
@@ -191,7 +191,7 @@ def check_clicks(
         CalibrationError: the recording cannot be read at the clicks.
     """
     scans = scans_around(recording, clicks, options)
-    return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
+    return tuple(_result_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
 
 
 def evaluation_exit_code(evaluation: Evaluation) -> int:
@@ -202,7 +202,7 @@ def evaluation_exit_code(evaluation: Evaluation) -> int:
     return 3 if any(warning.code in _DOUBTFUL for warning in evaluation.warnings) else 0
 
 
-def _under(pair: Pair, reference: Calibration) -> PairResult:
+def _result_under(pair: Pair, reference: Calibration) -> PairResult:
     points_radar_m = np.array([candidate.position_radar_m for candidate in pair.candidates])
     pixels_px = reference.reproject(points_radar_m)
     distances_px = np.linalg.norm(pixels_px - pair.pixel_px, axis=1)
@@ -256,13 +256,13 @@ def _have_cuboids(boxes: Boxes) -> bool:
     return 2 * sum(with_one) > len(with_one)
 
 
-def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
+def _lost_click_warnings(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     """Warn that clicks gave no residual."""
     facts = {"clicks": len(unpaired), "first": unpaired[0]} if unpaired else {}
     return (DataWarning("no-paired-clicks", facts),)
 
 
-def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
+def _box_warnings(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
     """Pass on what reading the boxes took for granted or left out, and name the classes that no box has."""
     absent = (f"no box is of the class '{name}'" for name in classes if name not in boxes.labels)
     notes = (*boxes.notes, *absent)
@@ -279,7 +279,7 @@ def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
     return ()
 
 
-def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
+def _warnings_on(returns: CountedReturns) -> tuple[DataWarning, ...]:
     if not len(returns.frames):
         far = {"max_range_m": TargetOptions().max_range_m}
         return (DataWarning("no-target-in-a-box") if returns.by_cuboid else DataWarning("no-targets", far),)
@@ -288,7 +288,7 @@ def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
     return ()
 
 
-def _turned(calibration: Calibration, returns: CountedReturns) -> list[DataWarning]:
+def _turned_warnings(calibration: Calibration, returns: CountedReturns) -> list[DataWarning]:
     """Warn if targets and boxes agree on another direction than the calibration."""
     if returns.bearings is None:
         return []

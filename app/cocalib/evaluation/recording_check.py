@@ -155,7 +155,7 @@ def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
         together = f", chi2 {test.chi2:.3g} for {test.degrees_of_freedom} degrees of freedom, p = {test.p_value:.2g}"
         if misfits == count:
             together = ""
-        judged = f"{int(test.outside.sum())} outside their stated 95 %{together}{_named(test)}"
+        judged = f"{int(test.outside.sum())} outside their stated 95 %{together}{_outlier_names(test)}"
     if holds:
         return CheckResult("good", "holds", f"holds: {residuals}; {judged}")
     return CheckResult(
@@ -166,7 +166,7 @@ def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
     )
 
 
-def _named(test: ResidualTest) -> str:
+def _outlier_names(test: ResidualTest) -> str:
     misfits = [name for name, misfit in zip(test.ids, test.misfits, strict=True) if misfit]
     more = ", ..." if len(misfits) > _NAMED else ""
     return f"; far off: {', '.join(misfits[:_NAMED])}{more}" if misfits else ""
@@ -208,7 +208,7 @@ def judged_calibration(
     return JudgedCalibration(
         found,
         calibration,
-        tuple(_about(path, one) for one in lens),
+        tuple(_meaning_warning(path, one) for one in lens),
     )
 
 
@@ -229,5 +229,5 @@ def require_size(camera: Camera, recording: Recording, path: Path) -> None:
         )
 
 
-def _about(path: Path, result: CheckResult) -> DataWarning:
+def _meaning_warning(path: Path, result: CheckResult) -> DataWarning:
     return DataWarning.reported(result.code, f"{path.name}: {result.message}", result.hint)

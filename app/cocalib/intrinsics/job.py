@@ -15,7 +15,7 @@ from calib_core.intrinsics.calibrating import calibrate_lens
 from calib_core.intrinsics.coverage import BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from calib_core.options import LensChoice
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -141,7 +141,7 @@ class LensJob:
         if stop.is_set():
             self._set(stage="cancelled", doing="")
         elif isinstance(found, Unsolvable):
-            said = outcome_told(found)
+            said = outcome_remark(found)
             self._set(stage="failed", problem=str(said.message), hint=str(said.hint), doing="")
         else:
             self._set(stage="done", search=found[0], lens=found[1], doing="")

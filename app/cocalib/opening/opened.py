@@ -27,7 +27,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 from calib_core.results import DataWarning
 from calib_core.words.outcomes import in_sentences
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.hypothesis_sheet import Offer, OpenMeaning
 from cocalib.opening.choice import Choice, ChoicePart, GivenClicks, MeaningPick, UnusablePartError, part_of_choice
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
@@ -86,7 +86,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
     if choice.below is not None:
         _require_unmoved(choice)
     opened = (
-        _awaited(choice, topics, tell)
+        _wait_for_recording(choice, topics, tell)
         if choice.follow
         else recordings.open_recording(choice.paths, topics, require=("radar",))
     )
@@ -130,7 +130,7 @@ def with_remembered(choice: Choice) -> RecordingOptions:
     return dataclasses.replace(topics, map=found)
 
 
-def _awaited(choice: Choice, topics: RecordingOptions, tell: Callable[[str], None]) -> Recording:
+def _wait_for_recording(choice: Choice, topics: RecordingOptions, tell: Callable[[str], None]) -> Recording:
     """Wait until there is enough of a recording that is being written, telling the terminal and the pages what is missing.
 
     Raises:
@@ -180,7 +180,7 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
             warnings=(
                 *folder.warnings,
                 *([] if copied is None else [copied.about]),
-                *(about_calibration(calibration.name, shown) if calibration else ()),
+                *(calibration_warnings(calibration.name, shown) if calibration else ()),
             ),
             camera_file=choice.camera_file,
             intrinsics=calibration.name if from_calibration and calibration else "",
@@ -303,16 +303,16 @@ def session_folder(choice: Choice, facts: RecordingFacts) -> FoundFolder:
         SessionFileError: an existing one cannot be renamed.
     """
     if choice.fresh:
-        return FoundFolder(_emptied(choice.session or recording_session_folder(choice.paths)))
+        return FoundFolder(_rename_session(choice.session or recording_session_folder(choice.paths)))
     if choice.session_plan == "continue":
         return FoundFolder(choice.session) if choice.session else find_session_folder(choice.paths, facts)
     named = choice.session or recording_session_folder(choice.paths)
     if choice.session_plan == "new" and has_session_of(named, facts):
-        return FoundFolder(_emptied(named))
+        return FoundFolder(_rename_session(named))
     return FoundFolder(unused_session_folder(named))
 
 
-def _emptied(folder: Path) -> Path:
+def _rename_session(folder: Path) -> Path:
     """Rename an existing session, so that a new one can start in its folder."""
     if (kept := set_aside(folder)) is not None:
         print(f"The previous session is kept in {kept}")
@@ -451,7 +451,7 @@ class GivenCalibration:
         if isinstance(stated, UnstatedFile):
             unstated = stated
             ranked = functools.cache(lambda place: hypotheses_of(unstated.pose_at(place)))
-            chosen = _chosen(unstated, pick, source, ranked)
+            chosen = _picked_meaning(unstated, pick, source, ranked)
             meaning = _open_meaning(unstated, self.name, camera, chosen, ranked)
             if chosen is None:
                 return ShownCalibration(None, meaning)
@@ -459,7 +459,7 @@ class GivenCalibration:
         return ShownCalibration(Reference(self.name, adopted_calibration(stated, source, camera=camera)), meaning)
 
 
-def about_calibration(name: str, shown: ShownCalibration | None) -> tuple[DataWarning, ...]:
+def calibration_warnings(name: str, shown: ShownCalibration | None) -> tuple[DataWarning, ...]:
     """Return what the user must know about the calibration to show: why it is not shown, or what is assumed about it.
 
     Args:
@@ -480,7 +480,9 @@ def about_calibration(name: str, shown: ShownCalibration | None) -> tuple[DataWa
         hint = "if returns lie beside what they come from, pick another meaning; clicks on the reflector test it"
         return (DataWarning.reported("calibration-picked", message, hint),)
     notes = [
-        str(told(warning).message) for warning in shown.reference.calibration.warnings if warning.code == "assumed"
+        str(warning_remark(warning).message)
+        for warning in shown.reference.calibration.warnings
+        if warning.code == "assumed"
     ]
     if not notes:
         return ()
@@ -490,7 +492,9 @@ def about_calibration(name: str, shown: ShownCalibration | None) -> tuple[DataWa
     )
 
 
-def _chosen(file: UnstatedFile, pick: MeaningPick, source: str, ranked: _Ranked) -> tuple[FoundPose, Hypothesis] | None:
+def _picked_meaning(
+    file: UnstatedFile, pick: MeaningPick, source: str, ranked: _Ranked
+) -> tuple[FoundPose, Hypothesis] | None:
     """Return the meaning that was picked, or else the only plausible one; None if there are several.
 
     Raises:

@@ -48,12 +48,12 @@ class RootFolder:
         parts = inside.split("/") if inside else []
         if inside.startswith(("/", "~")) or "\\" in inside or "\0" in inside or ".." in parts:
             raise InputError(
-                f"{_shown(inside)}: only folders below {self.path} can be opened in the page; choose one from its list"
+                f"{_entry_name(inside)}: only folders below {self.path} can be opened in the page; choose one from its list"
             )
         try:
             path = self.path.joinpath(*parts).resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            raise InputError(f"{_shown(inside)}: {_why(error)}; choose another one, or reload the list") from error
+            raise InputError(f"{_entry_name(inside)}: {_why(error)}; choose another one, or reload the list") from error
         self.require_inside(path, inside)
         return path
 
@@ -65,7 +65,7 @@ class RootFolder:
         """
         if found != self.path and self.path not in found.parents:
             raise InputError(
-                f"{_shown(inside)}: is a link that leads out of {self.path}; start cocalib open with its own path instead"
+                f"{_entry_name(inside)}: is a link that leads out of {self.path}; start cocalib open with its own path instead"
             )
 
     def recordings(self, inside: Sequence[str]) -> tuple[Path, ...]:
@@ -77,7 +77,7 @@ class RootFolder:
         paths = tuple(self.resolve(path) for path in inside)
         for path, given in zip(paths, inside, strict=True):
             if (kind := special_kind(path)) is not None:
-                raise InputError(f"{_shown(given)}: is {kind}, not a recording; choose a file or a folder")
+                raise InputError(f"{_entry_name(given)}: is {kind}, not a recording; choose a file or a folder")
         return paths
 
     def listing(self, inside: str) -> FolderListing:
@@ -92,9 +92,9 @@ class RootFolder:
             with os.scandir(folder) as entries:
                 inside_it = list(islice(entries, _MOST_ENTRIES + 1))
         except NotADirectoryError:
-            raise InputError(f"{_shown(inside)}: is not a folder; choose it as a recording instead") from None
+            raise InputError(f"{_entry_name(inside)}: is not a folder; choose it as a recording instead") from None
         except OSError as error:
-            raise InputError(f"{_shown(inside) or self.path}: {_why(error)}; choose another folder") from error
+            raise InputError(f"{_entry_name(inside) or self.path}: {_why(error)}; choose another folder") from error
         visible = [entry for entry in inside_it[:_MOST_ENTRIES] if not entry.name.startswith(".")]
         reachable = [entry for entry in visible if self._leads_inside(entry)]
         found = [listed for entry in reachable if (listed := self._entry(entry, here)) is not None]
@@ -157,5 +157,5 @@ def _why(error: OSError | RuntimeError) -> str:
     return error.strerror or str(error) if isinstance(error, OSError) else "its links lead in a circle"
 
 
-def _shown(inside: str) -> str:
+def _entry_name(inside: str) -> str:
     return inside[:200]

@@ -165,10 +165,10 @@ class RecordingChooser:
             return CameraFile.read(near)
         if command.file is None:
             raise InputError("no file of intrinsics was sent; drop one on the page")
-        return _dropped(command.file)
+        return _read_dropped_camera(command.file)
 
 
-def _dropped(file: DroppedFile) -> CameraFile:
+def _read_dropped_camera(file: DroppedFile) -> CameraFile:
     """Take a file that was dropped on the page; it is checked to be a camera's here, and its size against the frames later."""
     name = name_text(file.name.replace("\\", "/").rpartition("/")[2]) or "the file"
     dropped = CameraFile(name, file.data, file.camera or None)
@@ -338,7 +338,7 @@ def _size_of(path: Path) -> int:
 def _choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
     """Describe what can be chosen instead of what is open."""
     workspace = opened.workspace
-    described = _described(choice, opened.recording)
+    described = _choices_message(choice, opened.recording)
     folder = workspace.restored.folder if workspace.facts.has_images else None
     return replace(
         described,
@@ -359,16 +359,16 @@ def _choices_after(choice: Choice, problem: str) -> OpeningChoices:
         problem: why that failed, in sentences.
     """
     session = session_offer(choice, None, None)
-    nothing = OpeningChoices(0, choice.title, problem, session=session, intrinsics_near=_near(choice))
+    nothing = OpeningChoices(0, choice.title, problem, session=session, intrinsics_near=_nearest_name(choice))
     plain = replace(choice.topics, radar_topic=None, image_topic=None, camera_info_topic=None)
     try:
         with recordings.inspect_recording(choice.paths, plain) as recording:
-            return replace(_described(choice, recording), problem=problem, session=session)
+            return replace(_choices_message(choice, recording), problem=problem, session=session)
     except (CalibrationError, OSError):  # `problem` says what is wrong with it
         return nothing
 
 
-def _described(choice: Choice, recording: Recording) -> OpeningChoices:
+def _choices_message(choice: Choice, recording: Recording) -> OpeningChoices:
     return OpeningChoices(
         question=0,
         name=choice.title,
@@ -377,7 +377,7 @@ def _described(choice: Choice, recording: Recording) -> OpeningChoices:
         cameras=tuple(_row(topic) for topic in recording.topics if topic.kind == "image"),
         intrinsics=_intrinsics(choice, recording),
         recorded_intrinsics=recording.camera() is not None,
-        intrinsics_near=_near(choice),
+        intrinsics_near=_nearest_name(choice),
     )
 
 
@@ -388,7 +388,7 @@ def _intrinsics(choice: Choice, recording: Recording) -> str:
     return (recording.camera_info_topic or "the recording") if recording.camera() is not None else ""
 
 
-def _near(choice: Choice) -> str:
+def _nearest_name(choice: Choice) -> str:
     near = intrinsics_near(choice.paths)
     return near.name if near is not None else ""
 

@@ -12,7 +12,7 @@ from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, ResidualField,
 from calib_core.intrinsics.split_difference import split_difference
 from calib_core.measurements import Unsolvable
 from calib_core.words.intrinsics import halves_text, residuals_text
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark, text
@@ -83,7 +83,7 @@ def _warning_list(lens: CalibratedLens) -> Markup:
     """Return the warnings with what to do."""
     items = [
         tag("li", tag("code", warning.code), " ", sentence(str(said.message)), " ", tag("b", sentence(str(said.hint))))
-        for warning, said in zip(lens.warnings, map(told, lens.warnings), strict=True)
+        for warning, said in zip(lens.warnings, map(warning_remark, lens.warnings), strict=True)
     ]
     body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
     return tag("section", tag("h2", "Warnings"), body, id="cautions")
@@ -183,7 +183,7 @@ def _arrows(found: ResidualField, camera: Camera) -> Markup:
     said = (
         f"Mean residual of each part of the image; the longest line is {plain(longest, 2)} px. {residuals_text(found)}"
     )
-    return captioned("Mean residuals", _over_image(said, camera, *shapes), said)
+    return captioned("Mean residuals", _image_map(said, camera, *shapes), said)
 
 
 def _scatter(found: ResidualField) -> Markup:
@@ -204,14 +204,14 @@ def _uncertainty_over_the_image(lens: CalibratedLens) -> Markup:
     finite = sigmas[np.isfinite(sigmas)]
     span = f"{plain(float(finite.min()), 2)} to {plain(float(finite.max()), 2)} px" if len(finite) else "not known"
     said = f"Standard deviation of a far point's pixel: {span}; the darker, the less is known. {MODEL_ERRORS_UNSEEN}"
-    drawn = _over_image(said, lens.camera, *_cells(sigmas, lens.camera), _image_frame(lens.camera))
+    drawn = _image_map(said, lens.camera, *_cells(sigmas, lens.camera), _image_frame(lens.camera))
     shown: list[Child] = [captioned("Projection uncertainty", drawn, said)]
     halves = split_difference(lens)
     if isinstance(halves, Unsolvable):
         shown.append(tag("p", f"Not cross-checked: {halves_text(halves)}", class_="note"))
     else:
         cells = _cells(halves.apart_px, lens.camera)
-        drawn = _over_image(halves_text(halves), lens.camera, *cells, _image_frame(lens.camera))
+        drawn = _image_map(halves_text(halves), lens.camera, *cells, _image_frame(lens.camera))
         words = f"Distance between the projections of both lenses. {halves_text(halves)}"
         shown.append(captioned("Halves calibrated separately", drawn, words))
     return tag("section", tag("h2", "How well the lens is known"), tag("div", *shown, class_="two"), id="uncertainty")
@@ -234,7 +234,7 @@ def covered(lens: CalibratedLens, coverage: Coverage) -> Markup:
                 text(left + _WIDTH / columns / 2, top + height / rows / 2 + 3, str(count), class_="middle label")
             )
     said = f"Corners in each part of the image; {100.0 * coverage.share:.0f} % of it is covered."
-    return captioned("In the image", _over_image(said, camera, *shapes), said)
+    return captioned("In the image", _image_map(said, camera, *shapes), said)
 
 
 def _share_text(value: float) -> str:
@@ -279,7 +279,7 @@ def _places(camera: Camera, u_px: float, v_px: float) -> tuple[float, float]:
     return (u_px + 0.5) * scale, (v_px + 0.5) * scale
 
 
-def _over_image(alternative: str, camera: Camera, *shapes: Child) -> Markup:
+def _image_map(alternative: str, camera: Camera, *shapes: Child) -> Markup:
     return drawing(alternative, *shapes, width=_WIDTH, height=_height(camera))
 
 

@@ -11,7 +11,7 @@ from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 from calib_core.results.calibration import CHI2_95_2, CHI2_95_3, CHI2_95_6
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import RecordedView
 
@@ -192,7 +192,7 @@ def _lines(view: RecordedView) -> Iterator[str]:
             "because Rerun has no lens distortion"
         )
     for warning in view.calibration.warnings:
-        yield f"warning {warning.code}: {told(warning).message}"
+        yield f"warning {warning.code}: {warning_remark(warning).message}"
 
 
 def _figures(view: RecordedView) -> Iterator[str]:

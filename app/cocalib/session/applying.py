@@ -49,20 +49,20 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     if isinstance(event, Solved):
         if event.revision != session.revision:
             return session
-        return _answered(event, session)
+        return _with_answer(event, session)
     if isinstance(event, AxesStated):
         return session
     if isinstance(event, ScansAdded):
         return replace(session, revision=session.revision + 1)
     if isinstance(event, _Aside):
-        return _aside(event, session)
-    changed = _changed(event, session, facts)
+        return _keep_answer(event, session)
+    changed = _apply_event(event, session, facts)
     if (changed.clicks, changed.options, changed.intrinsics) == (session.clicks, session.options, session.intrinsics):
         return session
     return replace(changed, revision=session.revision + 1)
 
 
-def _answered(event: Solved, session: Session) -> Session:
+def _with_answer(event: Solved, session: Session) -> Session:
     """Return the session with an answer; what its preview changed already counts as changed by it."""
     before, after = (one.pairs if isinstance(one, Calibration) else () for one in (session.outcome, event.outcome))
     changed = changed_returns(before, after)
@@ -77,7 +77,7 @@ def _answered(event: Solved, session: Session) -> Session:
     )
 
 
-def _aside(event: _Aside, session: Session) -> Session:
+def _keep_answer(event: _Aside, session: Session) -> Session:
     """Return the session after an event that no pose depends on; answers in progress stay valid."""
     if isinstance(event, WarningsAcknowledged):
         return _acknowledged(event, session)
@@ -107,18 +107,18 @@ def _dismissed(event: PlacementDismissed, session: Session) -> Session:
 
 
 @singledispatch
-def _changed(event: Step, session: Session, facts: RecordingFacts) -> Session:
+def _apply_event(event: Step, session: Session, facts: RecordingFacts) -> Session:
     """Return the session with the event applied; `apply` increments the revision."""
     raise TypeError(f"not an event of the session: {event!r}")
 
 
-@_changed.register
+@_apply_event.register
 def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
     _require_frame(event.image_time, facts)
     u_px, v_px = _require_pixel(event.pixel_px, facts)
     for click in session.clicks:
         if click.image_time == event.image_time and (click.u_px, click.v_px) == event.pixel_px:
-            return _with_click(session, _marked(click, event.mark, event.sigma_px))
+            return _with_click(session, _marked_click(click, event.mark, event.sigma_px))
     click = ReflectorClick(
         event.image_time,
         f"c{session.next_click}",
@@ -131,14 +131,14 @@ def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Sess
     return replace(_with_click(session, click), next_click=session.next_click + 1)
 
 
-def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> ReflectorClick:
+def _marked_click(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> ReflectorClick:
     """Return a click that was marked again at its pixel: a guess becomes a measurement; what a person marked stays as it is."""
     marked = replace(click, mark=mark, sigma_px=sigma_px) if click.mark == "untouched" or mark == "snapped" else click
     _require_sigma(marked)
     return marked
 
 
-@_changed.register
+@_apply_event.register
 def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
     u_px, v_px = _require_pixel(event.pixel_px, facts)
     click = _click(session, event.id)
@@ -149,42 +149,42 @@ def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Sessio
     return _with_click(session, moved)
 
 
-@_changed.register
+@_apply_event.register
 def _chosen(event: ReturnChosen, session: Session, facts: RecordingFacts) -> Session:
     if event.chosen is not None and not all(map(math.isfinite, event.chosen.position_m)):
         raise EventError("the position of the chosen return is not finite; give it in metres")
     return _with_click(session, replace(_click(session, event.id), chosen=event.chosen))
 
 
-@_changed.register
+@_apply_event.register
 def _removed(event: ClickRemoved, session: Session, facts: RecordingFacts) -> Session:
     gone = _click(session, event.id)
     return replace(session, clicks=tuple(click for click in session.clicks if click is not gone))
 
 
-@_changed.register
+@_apply_event.register
 def _excluded(event: ClickExcluded, session: Session, facts: RecordingFacts) -> Session:
     return _with_click(session, replace(_click(session, event.id), excluded=event.excluded))
 
 
-@_changed.register
+@_apply_event.register
 def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFacts) -> Session:
     return replace(session, options=changed_options(session.options, changes_from_tree(event.options)))
 
 
-@_changed.register
+@_apply_event.register
 def _intrinsics_chosen(event: IntrinsicsChosen, session: Session, facts: RecordingFacts) -> Session:
     if event.intrinsics is not None:
         _require_camera(event.intrinsics, facts)
     return replace(session, intrinsics=event.intrinsics)
 
 
-@_changed.register
+@_apply_event.register
 def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session:
     return replace(session, clicks=(), outcome=None, outcome_revision=-1, checked=())
 
 
-@_changed.register
+@_apply_event.register
 def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
     imported = sorted(map(click_of, event.clicks))
     for click in imported:

@@ -68,7 +68,7 @@ def require_confirmed(recording: Recording, *, but: str = "") -> None:
         )
 
 
-def about_speed_unit(
+def speed_unit_notes(
     recording: Recording,
     clicks: Sequence[ReflectorClick],
     camera: Camera,

@@ -22,12 +22,12 @@ from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.pair_tables import PairTable, read_pair_table
 from calib_core.measurements import Candidate, DataWarning, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
-from calib_core.recordings import Recording, RecordingOptions, about_assumptions
+from calib_core.recordings import Recording, RecordingOptions, assumption_warnings
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import damaged_recording, lost_returns
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.platform.resources import version
 from cocalib.session.state import Outcome
 
@@ -93,10 +93,10 @@ def solve_in_steps(
         yield Unsolvable("no-camera")
         return
     scans = scans_around(recording, clicks, options)
-    about_lost = _about_lost(recording, clicks, options)
+    lost_message_warnings = _lost_return_warnings(recording, clicks, options)
     for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
-        if about_lost and isinstance(outcome, Calibration):
-            outcome = dataclasses.replace(outcome, warnings=(*about_lost, *outcome.warnings))
+        if lost_message_warnings and isinstance(outcome, Calibration):
+            outcome = dataclasses.replace(outcome, warnings=(*lost_message_warnings, *outcome.warnings))
         yield _with_damage(outcome, recording) if isinstance(recording, Recording) else outcome
 
 
@@ -111,7 +111,7 @@ def _with_damage(outcome: Calibration | Unsolvable, recording: Recording) -> Cal
     return dataclasses.replace(outcome, warnings=(warning, *outcome.warnings))
 
 
-def _about_lost(
+def _lost_return_warnings(
     recording: RadarSource, clicks: Sequence[ReflectorClick], options: CalibrationOptions
 ) -> tuple[DataWarning, ...]:
     """Warn if returns around the clicks are lost, or more than 5 % of those read so far."""
@@ -298,11 +298,11 @@ def calibration_text(
         (assumption.assumption, assumption.confirmed or assumption.assumption.words in confirmed)
         for assumption in recording.stated_assumptions
     ]
-    unsure = about_assumptions([assumption for assumption, sure in assumed if not sure])
+    unsure = assumption_warnings([assumption for assumption, sure in assumed if not sure])
     if unsure:
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
     provenance = Provenance(
-        damage=tuple(str(told(one).message) for one in recording.damage),
+        damage=tuple(str(warning_remark(one).message) for one in recording.damage),
         inputs=(
             *recording.fingerprint(),
             *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),
@@ -363,7 +363,7 @@ def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehic
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
-    warnings = (*calibration.warnings, *about_assumptions(given.assumed))
+    warnings = (*calibration.warnings, *assumption_warnings(given.assumed))
     provenance = Provenance(
         inputs=inputs, version=version(), assumptions=tuple(AssumptionNote(one.text, False) for one in given.assumed)
     )

@@ -95,16 +95,16 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     candidates = _distinct((*pair.candidates, *pair.set_aside, *more))
     if calibration is not None:
-        candidates = _in_view(calibration, candidates, _used(calibration, pair, candidates))
-    used = _used(calibration, pair, candidates)
+        candidates = _in_view(calibration, candidates, _used_index(calibration, pair, candidates))
+    used = _used_index(calibration, pair, candidates)
     fits = candidate_fits(calibration, pair, candidates) if calibration else ()
     rows = [
         _row(candidate, fits[i] if fits else None, used=i == used, chosen=i == used and pair.chosen is not None)
         for i, candidate in enumerate(candidates)
     ]
     order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
-    rival = _rival(calibration, pair, candidates)
-    better = _better(fits, used) if rival < 0 else rival
+    rival = _rival_index(calibration, pair, candidates)
+    better = _better_index(fits, used) if rival < 0 else rival
     ordered = tuple(rows[i] for i in order)
     if better < 0:
         return PairCandidates(pair.id, session.revision, ordered)
@@ -136,26 +136,26 @@ def _distinct(candidates: Sequence[Candidate]) -> list[Candidate]:
     return kept
 
 
-def _used(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
+def _used_index(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
     """Return the index of the candidate in use; -1 before there is a pose."""
     if calibration is None:
         return 0 if pair.chosen is not None else -1
-    return _at(next(one.point_radar_m for one in calibration.pairs if one.id == pair.id), candidates)
+    return _index_at(next(one.point_radar_m for one in calibration.pairs if one.id == pair.id), candidates)
 
 
-def _rival(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
+def _rival_index(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
     """Return the index of the candidate that explains the click as well as the one in use; -1 if there is none."""
     rivals = () if calibration is None else [one.rival for one in calibration.pairs if one.id == pair.id]
-    return next((_at(pair.candidates[rival].position_radar_m, candidates) for rival in rivals if rival >= 0), -1)
+    return next((_index_at(pair.candidates[rival].position_radar_m, candidates) for rival in rivals if rival >= 0), -1)
 
 
-def _at(position_m: Vector3, candidates: Sequence[Candidate]) -> int:
+def _index_at(position_m: Vector3, candidates: Sequence[Candidate]) -> int:
     """Return the index of the candidate at a position; -1 if there is none."""
     away = [float(np.abs(candidate.position_radar_m - position_m).max()) for candidate in candidates]
     return int(np.argmin(away)) if away and min(away) <= _SAME_M else -1
 
 
-def _better(fits: Sequence[CandidateFit], used: int) -> int:
+def _better_index(fits: Sequence[CandidateFit], used: int) -> int:
     """Return the index of a candidate that fits where the one in use does not; -1 if there is none."""
     if not fits:
         return -1

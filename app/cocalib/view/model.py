@@ -11,7 +11,7 @@ from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.actions import SetOption
 from calib_core.results.verdict import VerdictLevel
 from calib_core.words.text import Words, sentence, words
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.session.state import DismissedPlacement
 
 Level: TypeAlias = Literal["none", "plain", "good", "warning"]
@@ -211,7 +211,7 @@ class WarningRow:
 
 def warning_row(warning: DataWarning) -> WarningRow:
     """Return a warning as the page shows it."""
-    said = told(warning)
+    said = warning_remark(warning)
     kind = type(said.action).__name__ if said.action is not None else ""
     option = said.action.name if isinstance(said.action, SetOption) else ""
     return WarningRow(warning.code, sentence(said.message), sentence(said.hint), kind, option)

@@ -387,12 +387,12 @@ def compared(revision: int, a: Solution, b: Solution) -> Compared:
 
 def _marks(a: Calibration, b: Calibration) -> Iterator[ComparedMark]:
     """Yield one mark per pair of either; a solution without pairs, such as one from a file, draws those of the other."""
-    of_a, of_b = _drawn(a, b), _drawn(b, a)
+    of_a, of_b = _drawn_pixels(a, b), _drawn_pixels(b, a)
     for name in dict.fromkeys((*of_a, *of_b)):
         yield ComparedMark(name, of_a.get(name), of_b.get(name))
 
 
-def _drawn(own: Calibration, other: Calibration) -> dict[str, tuple[float, float] | None]:
+def _drawn_pixels(own: Calibration, other: Calibration) -> dict[str, tuple[float, float] | None]:
     pairs = own.pairs or other.pairs
     if not pairs:
         return {}

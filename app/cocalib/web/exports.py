@@ -123,20 +123,20 @@ def pose_in_file(found: ImportedCalibration, frames: FrameNames) -> PoseInFile:
 
 def our_numbers(camera_from_radar: RigidTransform) -> FileNumbers:
     """Return the calibration's own pose: matrix, translation and quaternion."""
-    quaternion = _named(_ORDERS["quaternion_wxyz"], quaternion_wxyz_from_matrix(camera_from_radar.rotation), "")
+    quaternion = _named_numbers(_ORDERS["quaternion_wxyz"], quaternion_wxyz_from_matrix(camera_from_radar.rotation), "")
     return FileNumbers("camera_from_radar of the calibration", (*_matrix_rows(camera_from_radar), *quaternion))
 
 
 def _rows(pose: WrittenPose) -> tuple[NumberRow, ...]:
     if pose.form == "matrix":
         return _matrix_rows(RigidTransform(pose.rotation_matrix(), pose.translation_m))
-    position = _named(("x", "y", "z"), pose.translation_m, "m")
+    position = _named_numbers(("x", "y", "z"), pose.translation_m, "m")
     if pose.form != "rpy":
-        return (*position, *_named(_ORDERS[pose.form], pose.rotation, ""))
+        return (*position, *_named_numbers(_ORDERS[pose.form], pose.rotation, ""))
     if pose.angle_unit == "deg":  # 12 digits: what is left of the way to radians and back
         angles = np.array([float(f"{angle:.12g}") for angle in np.rad2deg(pose.rotation)])
-        return (*position, *_named(_ORDERS["rpy"], angles, "deg"))
-    return (*position, *_named(_ORDERS["rpy"], pose.rotation, "rad"))
+        return (*position, *_named_numbers(_ORDERS["rpy"], angles, "deg"))
+    return (*position, *_named_numbers(_ORDERS["rpy"], pose.rotation, "rad"))
 
 
 def _matrix_rows(transform: RigidTransform) -> tuple[NumberRow, ...]:
@@ -148,7 +148,7 @@ def _rounded(values: np.ndarray) -> tuple[str, ...]:
     return tuple(f"{value:.9f}" for value in (np.round(values, 9) + 0.0).tolist())
 
 
-def _named(names: tuple[str, ...], values: np.ndarray, unit: str) -> tuple[NumberRow, ...]:
+def _named_numbers(names: tuple[str, ...], values: np.ndarray, unit: str) -> tuple[NumberRow, ...]:
     return tuple(
         NumberRow(name, (repr(value + 0.0),), unit) for name, value in zip(names, values.tolist(), strict=True)
     )

@@ -146,7 +146,7 @@ def _interpolated(keys: dict[int, Box | None], frames: range) -> Iterator[tuple[
             continue
         for at in _frames_between(frames, number, following):
             share = (at - number) / (following - number)
-            yield at, box if after is None else _between(box, after, share)
+            yield at, box if after is None else _interpolated_box(box, after, share)
 
 
 def _frames_between(frames: range, first: int, stop: int) -> Sequence[int]:
@@ -154,7 +154,7 @@ def _frames_between(frames: range, first: int, stop: int) -> Sequence[int]:
     return range(frames.start + skipped * frames.step, min(stop, frames.stop), frames.step)
 
 
-def _between(box: Box, after: Box, share: float) -> Box:
+def _interpolated_box(box: Box, after: Box, share: float) -> Box:
     left_px, top_px, right_px, bottom_px = (
         (1 - share) * one + share * other
         for one, other in (

@@ -191,12 +191,12 @@ def _link(root: Mapping[str, Any], moved: _Moved, child: str, parent: str, place
     """Return parent_from_child: the frame's, else the one that always holds; None if that is not stated."""
     for pair in ((child, parent), (parent, child)):
         if pair in moved:
-            transform = _stated(_part(moved[pair], "transform_src_to_dst"), place)
+            transform = _stated_transform(_part(moved[pair], "transform_src_to_dst"), place)
             return transform if transform is None or pair[0] == child else transform.inverse()
-    return _stated(_part(_part(_part(root, "coordinate_systems"), child), "pose_wrt_parent"), place)
+    return _stated_transform(_part(_part(_part(root, "coordinate_systems"), child), "pose_wrt_parent"), place)
 
 
-def _stated(pose: Mapping[str, Any], place: str) -> RigidTransform | None:
+def _stated_transform(pose: Mapping[str, Any], place: str) -> RigidTransform | None:
     if "matrix4x4" in pose:
         matrix = np.array(numbers(pose["matrix4x4"], 16, place)).reshape(4, 4)
         return stated_pose(matrix[:3, :3], matrix[:3, 3].tolist(), place)

@@ -45,7 +45,7 @@ def read_camera(
         InputError: no camera, or an invalid one; the message says what was looked for, what was found and what to do.
     """
     cameras = _own_syntax(text, source=source) or _keyed(text, source=source)
-    return _chosen(cameras, name, source=source).camera(image_size_px=image_size_px, source=source)
+    return _choose_camera(cameras, name, source=source).camera(image_size_px=image_size_px, source=source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class CameraFile:
         """
         binary = _own_syntax(self.data, source=self.source)
         if binary:
-            found = _chosen(binary, self.name, source=self.source)
+            found = _choose_camera(binary, self.name, source=self.source)
             camera = found.camera(image_size_px=image_size_px, source=self.source)
         else:
             try:
@@ -160,7 +160,7 @@ def _load(text: str, *, source: str) -> Any:
     return load_yaml(text, source=source)
 
 
-def _chosen(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) -> FoundCamera:
+def _choose_camera(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) -> FoundCamera:
     names = [camera.name for camera in cameras]
     if name is not None:
         if name not in names:

@@ -60,7 +60,7 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
     if data.startswith(_MAT_7_3):
         raise InputError(f"{source}: a mat file of version 7.3; in MATLAB save it with -v7")
     variables = load_mat(data, source=source)
-    cameras = tuple(_found(name, values, source) for name, values in _structs(variables))
+    cameras = tuple(_camera_of(name, values, source) for name, values in _structs(variables))
     if not cameras:
         raise InputError(
             f"{source}: no struct with IntrinsicMatrix, K or FocalLength in it; in MATLAB: "
@@ -79,7 +79,7 @@ def _structs(variables: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, A
                 yield from _structs(values)
 
 
-def _found(name: str, values: Mapping[str, Any], source: str) -> FoundCamera:
+def _camera_of(name: str, values: Mapping[str, Any], source: str) -> FoundCamera:
     matrix = _matrix(name, values, source)
     matrix[:2, 2] -= ONE_BASED
     radial, tangential = (_row(values, key) for key in ("RadialDistortion", "TangentialDistortion"))

@@ -109,7 +109,9 @@ class Comparison:
     def notes(self) -> tuple[str, ...]:
         """What was compared, if that is not all of both."""
         one = "only one of the two uncertainties is known; the standard deviations come from that one alone"
-        shared = f"the errors of {_listed(self.shared)} are the same in both, and are taken out" if self.shared else ""
+        shared = (
+            f"the errors of {_name_list(self.shared)} are the same in both, and are taken out" if self.shared else ""
+        )
         unshared = f"every error counts as independent, because {self.unshared}" if self.unshared else ""
         return tuple(filter(None, (self.lens_note, shared, unshared, one if self.covariances == 1 else "")))
 
@@ -203,7 +205,7 @@ def _change(
     return joint, ("radar", *(["lens"] if lens else []), *(["clicks"] if same_person else [])), ""
 
 
-def _listed(names: Sequence[str]) -> str:
+def _name_list(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
 
 
@@ -335,7 +337,9 @@ def judge(comparison: Comparison, limits: AgreementLimits) -> Judgement:
         level = LEVEL if limits.max_sigma is None else level_of(limits.max_sigma)
     elif change is not None:
         criteria, basis = [_by_change(change)], "95 % test under the stated covariances"
-        basis = f"95 % test with the errors of {_listed(comparison.shared)} taken out" if comparison.shared else basis
+        basis = (
+            f"95 % test with the errors of {_name_list(comparison.shared)} taken out" if comparison.shared else basis
+        )
     else:
         criteria = _by_limits(comparison, AgreementLimits(WITHOUT_COVARIANCE["deg"], WITHOUT_COVARIANCE["cm"]))
         criteria += _pixels_at(comparison, _JUDGED_AT_M, WITHOUT_COVARIANCE["px"])

@@ -92,7 +92,7 @@ def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | N
     if known is None:
         return None
     size_px = (known.width_px, known.height_px)
-    of_a, of_b = (_stated(side, size_px) for side in (a, b))
+    of_a, of_b = (_stated_camera(side, size_px) for side in (a, b))
     if of_a is None or of_b is None:
         one = of_a or of_b or known
         return Lenses(one, one)
@@ -104,7 +104,7 @@ def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | N
     return Lenses(of_a, of_a if np.isnan(difference.rms_px) else of_b, difference, note)
 
 
-def _stated(side: ImportedCalibration, size_px: tuple[int, int]) -> Camera | None:
+def _stated_camera(side: ImportedCalibration, size_px: tuple[int, int]) -> Camera | None:
     try:
         return side.camera_for(size_px)
     except ValueError:  # not a camera matrix; reading or importing it says so
@@ -127,7 +127,7 @@ def _lens_difference(first: Camera, second: Camera) -> LensDifference:
         (a, b), (c, d) = sizes
         return LensDifference(float("nan"), float("nan"), f"images of {a} x {b} px and of {c} x {d} px")
     pixels, rays = _grid(first)
-    apart, lost = _apart(second, rays, pixels)
+    apart, lost = _distances_px(second, rays, pixels)
     rms_px, max_px = _rms_and_max(apart, lost)
     return LensDifference(rms_px, max_px, "; ".join(_different_numbers(first, second)))
 
@@ -187,8 +187,8 @@ def _one_way(
     pixels, rays = _grid(lens)
     points_camera_m = rays * distance_m
     moved_camera_m = moved @ points_camera_m
-    apart, lost = _apart(other, moved_camera_m, pixels)
-    by_pose = _rms_and_max(*_apart(lens, moved_camera_m, pixels))[0]
+    apart, lost = _distances_px(other, moved_camera_m, pixels)
+    by_pose = _rms_and_max(*_distances_px(lens, moved_camera_m, pixels))[0]
     motion = np.stack([np.hstack([np.eye(3), -skew(point)]) for point in points_camera_m])
     by_error = lens.project_with_jacobian(points_camera_m)[1] @ motion
     variances = np.einsum("nij,jk,nik->n", by_error, covariance, by_error)
@@ -206,7 +206,7 @@ def _grid(camera: Camera) -> tuple[Points2, Points3]:
     return camera.project(rays[seen]), rays[seen]
 
 
-def _apart(camera: Camera, points_camera_m: Points3, pixels: Points2) -> tuple[Values, Flags]:
+def _distances_px(camera: Camera, points_camera_m: Points3, pixels: Points2) -> tuple[Values, Flags]:
     """Return how far (n,) points project from given pixels, and which of them (n,) the camera does not see at all."""
     apart = np.linalg.norm(camera.project(points_camera_m) - pixels, axis=1)
     return apart, far_outside(apart, camera)

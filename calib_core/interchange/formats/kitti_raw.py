@@ -62,7 +62,7 @@ def _read_raw(content: Content, source: str) -> ImportedCalibration:
     translation_m = _numbers(lines, "T", 3, source=source)
     camera0_from_radar = rigid("matrix", rotation.reshape(3, 3), translation_m, source=source)
     if _CAMERAS not in content.beside:
-        return _found(
+        return _calibration_of(
             camera0_from_radar,
             f"no {_CAMERAS} beside the file: the camera is camera 0 before rectification",
             source=source,
@@ -94,7 +94,9 @@ def _read_odometry(content: Content, source: str) -> ImportedCalibration:
     matrix = _numbers(lines, "Tr", 12, source=source).reshape(3, 4)
     camera0_from_radar = rigid("matrix", matrix[:, :3], matrix[:, 3], source=source)
     if "P2" not in lines:
-        return _found(camera0_from_radar, "no P2 in the file: the camera is the rectified camera 0", source=source)
+        return _calibration_of(
+            camera0_from_radar, "no P2 in the file: the camera is the rectified camera 0", source=source
+        )
     projection = _numbers(lines, "P2", 12, source=source).reshape(3, 4)
     return _projected(camera0_from_radar, projection, None, source=source)
 
@@ -112,12 +114,12 @@ def _projected(
         raise InputError(f"{source}: the projection of camera 2 has no camera matrix in it; correct it")
     offset_m = np.linalg.solve(matrix, projection[:, 3])
     camera2_from_camera0 = RigidTransform(np.eye(3), offset_m)
-    calibration = _found(camera2_from_camera0 @ camera0_from_radar, _UNDISTORTED, source=source)
+    calibration = _calibration_of(camera2_from_camera0 @ camera0_from_radar, _UNDISTORTED, source=source)
     camera = FoundCamera("P2", "", tuple(matrix.ravel().tolist()), (), size_px)
     return with_camera(calibration, camera, source=source)
 
 
-def _found(camera_from_radar: RigidTransform, assumption: str, *, source: str) -> ImportedCalibration:
+def _calibration_of(camera_from_radar: RigidTransform, assumption: str, *, source: str) -> ImportedCalibration:
     pose = WrittenPose("matrix", camera_from_radar.rotation, camera_from_radar.translation_m, "camera_from_radar")
     return ImportedCalibration("kitti-raw", pose, assumptions=(_AS_RADAR, assumption)).checked(source)
 

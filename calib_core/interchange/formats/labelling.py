@@ -29,7 +29,7 @@ def _images(content: Content) -> list[Mapping[str, Any]]:
     return [image for image in (images if isinstance(images, list) else [top]) if isinstance(image, Mapping)]
 
 
-def _chosen(images: list[Mapping[str, Any]], key: str, *, source: str) -> Mapping[str, Any]:
+def _choose_sensor(images: list[Mapping[str, Any]], key: str, *, source: str) -> Mapping[str, Any]:
     posed = [image for image in images if key in image]
     if len(posed) != 1:
         raise InputError(f"{source}: images: {len(posed)} cameras with a pose; keep only the intended one")
@@ -46,7 +46,7 @@ def _read_scale(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: there are several cameras, the device's pose is missing, or a number is.
     """
-    image = _chosen(_images(content), "heading", source=source)
+    image = _choose_sensor(_images(content), "heading", source=source)
     pose, place = _scale_pose(image, "", source=source), "device"
     if image is not content.mapping:
         frame = content.mapping
@@ -55,7 +55,7 @@ def _read_scale(content: Content, source: str) -> ImportedCalibration:
                 f"{source}: no device_heading, so the camera's pose in the device is unknown; add it and device_position"
             )
         pose = _scale_pose(frame, "device_", source=source).inverse() @ pose
-    calibration = _found("scale", pose, (_AS_RADAR.format(place),), source=source)
+    calibration = _calibration_of("scale", pose, (_AS_RADAR.format(place),), source=source)
     return with_camera(calibration, _scale_camera(image, source=source), source=source)
 
 
@@ -100,7 +100,7 @@ def _read_segments(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: there are several cameras, a number is missing, or the convention is unknown.
     """
-    image = _chosen(_images(content), "extrinsics", source=source)
+    image = _choose_sensor(_images(content), "extrinsics", source=source)
     extrinsics = image["extrinsics"]
     translation_m = named_numbers(extrinsics.get("translation"), "xyz", source=source, place="extrinsics.translation")
     rotation = named_numbers(
@@ -115,7 +115,7 @@ def _read_segments(content: Content, source: str) -> ImportedCalibration:
         assumptions.append("no camera_convention: assumed OpenGL axes (y up, z backwards), the service's default")
     if convention.lower() != "opencv":
         pose = pose @ _OPENGL_FROM_OPTICAL
-    calibration = _found("segments", pose, tuple(assumptions), source=source)
+    calibration = _calibration_of("segments", pose, tuple(assumptions), source=source)
     return with_camera(calibration, _segments_camera(image, source=source), source=source)
 
 
@@ -135,7 +135,7 @@ def _segments_camera(image: Mapping[str, Any], *, source: str) -> FoundCamera | 
     return _lens(model, matrix, {key: given.get(key) or 0.0 for key in keys}, source=source)
 
 
-def _found(
+def _calibration_of(
     name: str, radar_from_camera: RigidTransform, assumptions: tuple[str, ...], *, source: str
 ) -> ImportedCalibration:
     pose = WrittenPose("matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera")

@@ -68,11 +68,11 @@ def _faults(arrays: Mapping[str, Any]) -> tuple[str, ...]:
     beside = {"R": rotation, "t": translation_m}
     if "camera_from_radar" not in arrays:
         return ()
-    other = [key for key in beside if key in arrays and not _alike(arrays[key], beside[key])]
+    other = [key for key in beside if key in arrays and not _are_equal(arrays[key], beside[key])]
     return tuple(f"{key} is not that of camera_from_radar" for key in other)
 
 
-def _alike(value: object, right: np.ndarray) -> bool:
+def _are_equal(value: object, right: np.ndarray) -> bool:
     found = np.asarray(value, dtype=np.float64)
     return found.size == right.size and bool(np.abs(found.ravel() - right.ravel()).max() <= _ROUNDING)
 

@@ -107,10 +107,10 @@ def _from_publishers(found: list[list[str]], text: str, *, source: str, name: st
     Raises:
         InputError: there is none, or more than one, or its arguments are not a pose between two frames.
     """
-    return _from_arguments(_chosen(found, text, source=source), text, source=source, name=name)
+    return _from_arguments(_choose_publisher(found, text, source=source), text, source=source, name=name)
 
 
-def _chosen(found: list[list[str]], text: str, *, source: str) -> list[str]:
+def _choose_publisher(found: list[list[str]], text: str, *, source: str) -> list[str]:
     """Return the arguments of the one publisher that is between the radar and the camera."""
     if not found:
         return []

@@ -164,14 +164,14 @@ def _as_numbers(value: Any, keys: tuple[object, ...], texts: tuple[str, ...], se
 def _in_mapping(value: Mapping[Any, Any], keys: tuple[object, ...], texts: tuple[str, ...], search: _Search) -> None:
     """Look for a rotation and a translation next to each other, then into each value."""
     own = (text for text in value.values() if isinstance(text, str) and len(text) < _LONGEST_NAME)
-    texts = (*_between(value), *own, *texts)[:_MOST_TEXTS]
+    texts = (*_frames_named(value), *own, *texts)[:_MOST_TEXTS]
     taken = _pairs_in(value, keys, texts, search)
     for key, inner in value.items():
         if key not in taken:
             _look(inner, (*keys, key), texts, search)
 
 
-def _between(value: Mapping[Any, Any]) -> Iterator[str]:
+def _frames_named(value: Mapping[Any, Any]) -> Iterator[str]:
     """Yield which frames a mapping names, as words about the direction: a child's pose carries its points into the parent."""
     named = {
         str(key).lower(): text for key, text in value.items() if isinstance(text, str) and len(text) < _LONGEST_NAME
@@ -359,9 +359,9 @@ def named_rotation_readings(values: Mapping[Any, Any], words: Sequence[str] = ()
     Raises:
         ValueError: the quaternion does not have length 1, or a number is not finite.
     """
-    if (quaternion := _named(values, ("qw", "qx", "qy", "qz"))) is not None:
+    if (quaternion := _components_by_name(values, ("qw", "qx", "qy", "qz"))) is not None:
         return (RotationReading(_from_quaternion(quaternion)),)
-    angles = _named(values, *_ANGLE_NAMES[:2])
+    angles = _components_by_name(values, *_ANGLE_NAMES[:2])
     return () if angles is None else _angle_readings(angles, _angle_unit((*values, *words)), listed=False)
 
 
@@ -382,9 +382,9 @@ def rotation_readings(value: Any, key: object, words: Sequence[str] = ()) -> tup
         ValueError: it has the shape of a rotation and is none: mirrored, a quaternion of another length, not finite.
     """
     named = value if isinstance(value, Mapping) else {}
-    if (quaternion := _named(named, ("w", "x", "y", "z"), ("qw", "qx", "qy", "qz"))) is not None:
+    if (quaternion := _components_by_name(named, ("w", "x", "y", "z"), ("qw", "qx", "qy", "qz"))) is not None:
         return (RotationReading(_from_quaternion(quaternion)),)
-    if (angles := _named(named, *_ANGLE_NAMES)) is not None:
+    if (angles := _components_by_name(named, *_ANGLE_NAMES)) is not None:
         return _angle_readings(angles, _angle_unit((*named, key, *words)), listed=False)
     numbers = array_of(value)
     if numbers is None:
@@ -397,7 +397,7 @@ def rotation_readings(value: Any, key: object, words: Sequence[str] = ()) -> tup
     return _three_number_readings(_finite(numbers), set(words_of(key)), unit) if numbers.shape == (3,) else ()
 
 
-def _named(values: Mapping[Any, Any], *orders: tuple[str, ...]) -> np.ndarray | None:
+def _components_by_name(values: Mapping[Any, Any], *orders: tuple[str, ...]) -> np.ndarray | None:
     """Return components by name, whatever the case and the unit after it; None if one is missing."""
     by_name: dict[str, Any] = {}
     for key, value in values.items():
@@ -428,7 +428,7 @@ def named_vector(values: Mapping[Any, Any]) -> Vector3 | None:
     Raises:
         ValueError: one is not finite.
     """
-    return _named(values, ("tx", "ty", "tz"), ("x", "y", "z"))
+    return _components_by_name(values, ("tx", "ty", "tz"), ("x", "y", "z"))
 
 
 def _from_quaternion(wxyz: np.ndarray) -> np.ndarray:

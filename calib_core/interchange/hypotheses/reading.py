@@ -109,7 +109,7 @@ def read_unstated(content: str | bytes, source: str = "calibration") -> Unstated
         if found.poses:
             stem = PurePath(source).name.partition(".")[0]
             poses = tuple(_hinted_by_name(pose, stem) for pose in found.poses)
-            around = {pose.place: _camera_in(_around(pose.place, values), source) for pose in poses}
+            around = {pose.place: _camera_in(_object_around(pose.place, values), source) for pose in poses}
             beside = {place: camera for place, camera in around.items() if camera is not None}
             return UnstatedFile(source, poses, found.unreadable, _camera_in(values, source), beside)
         unreadable = found.unreadable or unreadable
@@ -135,7 +135,7 @@ def _hinted_by_name(pose: FoundPose, stem: str) -> FoundPose:
     return pose.with_hints(replace(pose.hints, carries_radar=named.carries_radar))
 
 
-def _around(place: str, values: object) -> object:
+def _object_around(place: str, values: object) -> object:
     """Return the innermost object around a place such as sensors.front.T."""
     for key in place.replace("[", ".").replace("]", "").split(".")[:-1]:
         if isinstance(values, list) and key.isdecimal() and int(key) < len(values):

@@ -443,7 +443,7 @@ def kept_results(content: Any, document: Any) -> tuple[KeptResult, ...]:
         content: parsed JSON that the type has accepted.
         document: the type to compare with.
     """
-    return tuple(_kept(content, document, ()))
+    return tuple(_kept_results(content, document, ()))
 
 
 def with_kept(content: dict[str, Any], kept: tuple[KeptResult, ...]) -> dict[str, Any]:
@@ -459,10 +459,10 @@ def with_kept(content: dict[str, Any], kept: tuple[KeptResult, ...]) -> dict[str
     return content
 
 
-def _kept(value: Any, annotation: Any, place: tuple[str | int, ...]) -> Iterator[KeptResult]:
+def _kept_results(value: Any, annotation: Any, place: tuple[str | int, ...]) -> Iterator[KeptResult]:
     if isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _kept(item, item_type(annotation), (*place, index))
+            yield from _kept_results(item, item_type(annotation), (*place, index))
     fields = fields_of(annotation)
     if not isinstance(value, dict) or fields is None:
         return
@@ -471,7 +471,7 @@ def _kept(value: Any, annotation: Any, place: tuple[str | int, ...]) -> Iterator
         if key not in fields or (not isinstance(item, dict) and _is_derived(inner)):
             yield KeptResult(inner, json.dumps(item))
         else:
-            yield from _kept(item, fields[key], inner)
+            yield from _kept_results(item, fields[key], inner)
 
 
 def _is_derived(place: tuple[str | int, ...]) -> bool:
@@ -543,11 +543,11 @@ def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place
         rival=-1 if document.rival is UNSET else document.rival,
         expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
         image_time=document.image_time,
-        measured=_measured(document, document.candidates) if document.candidates else None,
+        measured=_pair_of(document, document.candidates) if document.candidates else None,
     )
 
 
-def _measured(document: documents.SolvedPairDocument, candidates: Sequence[documents.CandidateDocument]) -> Pair:
+def _pair_of(document: documents.SolvedPairDocument, candidates: Sequence[documents.CandidateDocument]) -> Pair:
     return Pair(
         id=document.id,
         pixel_px=np.array(document.pixel_px),

@@ -47,7 +47,7 @@ def document_in(content: Mapping[str, Any], document: type[Document], *, source:
     if found != wanted:
         same = str(found).rpartition("-")[0] == wanted.rpartition("-")[0]
         step = "another version of cocalib wrote it: use that one" if same else "give a file of that format"
-        reason = f"schema: expected {wanted!r}, found {_shown(found)}; {step}"
+        reason = f"schema: expected {wanted!r}, found {_value_text(found)}; {step}"
         raise InputError(f"{source}: {other_kind(found, wanted) or reason}")
     return checked(content, document, source=source)
 
@@ -86,7 +86,7 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
     content = json_value(text, source=source)
     if not isinstance(content, dict):
         raise InputError(
-            f"{source}: expected an object in braces, found {_shown(content)}; give a file in one of cocalib's formats"
+            f"{source}: expected an object in braces, found {_value_text(content)}; give a file in one of cocalib's formats"
         )
     return content
 
@@ -95,7 +95,7 @@ def _schema_of(document: type) -> str:
     return str(get_args(get_type_hints(document)["schema"])[0])
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if value is None:
         return "none"
     if isinstance(value, dict | list):

@@ -10,12 +10,12 @@ from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor, TreePa
 
 def recognizes_foxglove(content: Content) -> bool:
     """Return whether JSON is a FrameTransforms message, alone or under its name."""
-    return bool(_listed(content))
+    return bool(_transform_list(content))
 
 
 def has_several_transforms(content: Content) -> bool:
     """Return whether it contains more than the one transform that the format's own reader reads."""
-    return len(_listed(content)) > 1
+    return len(_transform_list(content)) > 1
 
 
 def read_foxglove(content: Content, source: str) -> TreePart:
@@ -25,7 +25,7 @@ def read_foxglove(content: Content, source: str) -> TreePart:
         InputError: a frame name or a number is missing.
     """
     joints = []
-    for index, one in enumerate(_listed(content)):
+    for index, one in enumerate(_transform_list(content)):
         parent, child, written = posed_frames(one, source=source, place=f"transforms[{index}]")
         joints.append(Joint.posed(parent, child, written, Place(source)))
     camera = content.json_mapping.get("CameraCalibration")
@@ -33,7 +33,7 @@ def read_foxglove(content: Content, source: str) -> TreePart:
     return TreePart("foxglove", tuple(joints), (Sensor(frame, "camera", "optical"),) if frame else ())
 
 
-def _listed(content: Content) -> list[Mapping[str, Any]]:
+def _transform_list(content: Content) -> list[Mapping[str, Any]]:
     messages = content.json_mapping
     alone = messages.get("FrameTransform", messages)
     is_one = isinstance(alone, Mapping) and "parent_frame_id" in alone

@@ -50,13 +50,13 @@ def choose_frames(tree: FrameTree, wanted: WantedFrames, *, source: str) -> Chos
     Raises:
         InputError: a name is not in the tree, or there is not exactly one radar and one camera; the message lists them.
     """
-    radars = (_named(tree, wanted.radar, "--radar-frame", source),) if wanted.radar else _radars_in(tree)
+    radars = (_frame_text(tree, wanted.radar, "--radar-frame", source),) if wanted.radar else _radars_in(tree)
     if wanted.camera:
-        named = _named(tree, wanted.camera, "--camera-frame", source)
+        named = _frame_text(tree, wanted.camera, "--camera-frame", source)
         cameras = _optical_below(tree, named) or (named,)
         if len(cameras) > 1:
             raise InputError(
-                f"{source}: {named} carries several cameras: {_listed(cameras)}; name one of them with --camera-frame"
+                f"{source}: {named} carries several cameras: {_frame_list(cameras)}; name one of them with --camera-frame"
             )
     else:
         cameras = _cameras_in(tree)
@@ -74,7 +74,7 @@ def _ambiguity(tree: FrameTree, radars: Sequence[str], cameras: Sequence[str]) -
         if len(names) == 1:
             continue
         flags.append(f"--{kind}-frame NAME")
-        found.append(f"{len(names)} {kind} frames: {_listed(names)}" if names else f"no frame named like a {kind}")
+        found.append(f"{len(names)} {kind} frames: {_frame_list(names)}" if names else f"no frame named like a {kind}")
     rest = "" if radars and cameras else f" (its frames: {tree.listed()})"
     hint = f"; {tree.hint}" if tree.hint and not (radars and cameras) else ""
     return f"{' and '.join(found)}{rest}{hint}; choose with {' and '.join(flags)}"
@@ -138,7 +138,7 @@ def _is_same(tree: FrameTree, above: str, below: str) -> bool:
     return bool(np.abs(tree.between(above, below).as_matrix() - np.eye(4)).max() <= _SAME)
 
 
-def _named(tree: FrameTree, name: str, flag: Literal["--radar-frame", "--camera-frame"], source: str) -> str:
+def _frame_text(tree: FrameTree, name: str, flag: Literal["--radar-frame", "--camera-frame"], source: str) -> str:
     wanted = name.strip().lstrip("/")
     if wanted in tree.frames:
         return wanted
@@ -148,5 +148,5 @@ def _named(tree: FrameTree, name: str, flag: Literal["--radar-frame", "--camera-
     raise InputError(f"{source}: {flag}: there is no frame {wanted!r} in it; {meant}{hint}")
 
 
-def _listed(names: Iterable[str]) -> str:
+def _frame_list(names: Iterable[str]) -> str:
     return ", ".join(names)

@@ -60,7 +60,7 @@ def read_nuscenes(poses: Content, source: str, sensors: Content | None) -> TreeP
         for joint in found:
             record = records[id(joint)]
             frame = channel if len(found) == 1 else f"{channel}@{str(record.get('token'))[:8]}"
-            joints.append(_named(joint, frame))
+            joints.append(_named_joint(joint, frame))
             known.append(_sensor(record, frame, source))
     return TreePart("nuscenes", tuple(joints), tuple(known), notes=(_NOTE,))
 
@@ -84,7 +84,7 @@ def _line_of(record: Mapping[str, Any], text: str) -> int | None:
     return text.count("\n", 0, at) + 1 if at >= 0 else None
 
 
-def _named(joint: Joint, frame: str) -> Joint:
+def _named_joint(joint: Joint, frame: str) -> Joint:
     if joint.written is None:
         return Joint(joint.parent, frame, None, joint.place, problem=joint.problem)
     return Joint.posed(joint.parent, frame, joint.written, joint.place)

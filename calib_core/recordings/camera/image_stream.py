@@ -183,7 +183,7 @@ def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesN
     )  # fmt: skip
 
 
-def about_video(images: ImageStream | None) -> list[DataWarning]:
+def video_warnings(images: ImageStream | None) -> list[DataWarning]:
     """Warn about frames that cannot be decoded because the recording began between key frames."""
     if not isinstance(images, VideoStream) or not images.before_key:
         return []
@@ -217,11 +217,11 @@ def frames_of_one_size(images: ImageStream | None) -> tuple[ImageStream | None, 
     if sizes[usual] == len(found):
         return images.keep(np.ones(count, dtype=bool), usual), []
     kept = np.array([size == usual for size in found])
-    warnings = [*_about_sizes(images, found, usual), *_about_unreadable(images, found)]
+    warnings = [*_size_warnings(images, found, usual), *_unreadable_warnings(images, found)]
     return images.keep(kept, usual), warnings
 
 
-def _about_sizes(
+def _size_warnings(
     images: ImageStream, found: Sequence[tuple[int, int] | MessageError], usual: tuple[int, int]
 ) -> list[DataWarning]:
     sizes = Counter(size for size in found if not isinstance(size, MessageError))
@@ -241,7 +241,7 @@ def _about_sizes(
     ]
 
 
-def _about_unreadable(images: ImageStream, found: Sequence[tuple[int, int] | MessageError]) -> list[DataWarning]:
+def _unreadable_warnings(images: ImageStream, found: Sequence[tuple[int, int] | MessageError]) -> list[DataWarning]:
     rows = [number for number, size in enumerate(found) if isinstance(size, MessageError)]
     if not rows:
         return []

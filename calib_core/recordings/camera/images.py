@@ -127,7 +127,7 @@ class ImageLayout:
         """Return width and height from the first bytes of a message; None if they are further on or cannot be read."""
         try:
             if not self.compressed:
-                message = decode(self._before("encoding"), head)
+                message = decode(self._fields_before("encoding"), head)
                 return message.whole("width"), message.whole("height")
             start = min((place for magic in (JPEG_MAGIC, PNG_MAGIC) if (place := head.find(magic)) >= 0), default=-1)
             data = head[start:] if start >= 0 else b""
@@ -135,7 +135,7 @@ class ImageLayout:
         except MessageError:
             return None
 
-    def _before(self, name: str) -> Definition:
+    def _fields_before(self, name: str) -> Definition:
         """Return a definition of the fields before one of them."""
         definition = self.definition
         fields = tuple(takewhile(lambda field: field.name != name, definition.fields))

@@ -82,12 +82,12 @@ def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray]
         name = ""
     lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
     if lens is None:
-        return f"has unknown lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are supported"
+        return f"has unknown lens model '{name}'; {_topic_list(names_in('camera_info'), 'and')} are supported"
     if lens.opencv == "projectPoints":
         return _model_by_count(name, distortion)
     kept = next((count for count in reversed(lens.counts) if count <= len(distortion)), None)
     if kept is None or np.any(distortion[kept:]):
-        expected = _listed([str(count) for count in lens.counts], "or")
+        expected = _topic_list([str(count) for count in lens.counts], "or")
         return f"has lens model '{name}' with {len(distortion)} coefficients; {expected} are expected"
     return lens.name, distortion[:kept]
 
@@ -102,12 +102,12 @@ def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np
         distortion = distortion[:longest]
     lens = next((lens for lens in lenses if len(distortion) in lens.counts), None)
     if lens is None:
-        known = _listed([str(count) for lens in lenses for count in lens.counts if count], "or")
+        known = _topic_list([str(count) for lens in lenses for count in lens.counts if count], "or")
         return f"has lens model '{name or 'none'}' with {len(distortion)} coefficients; {known} are supported"
     return lens.name, distortion
 
 
-def _listed(words: Sequence[str], conjunction: str) -> str:
+def _topic_list(words: Sequence[str], conjunction: str) -> str:
     *first, last = words
     return f"{', '.join(first)} {conjunction} {last}" if first else last
 

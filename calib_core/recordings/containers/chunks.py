@@ -441,7 +441,7 @@ def gather_far(source: ChunkedSource, file: FileBytes, index: MessageIndex, plac
     return Heads(gather.rows, gather.lengths, next((fault for fault in faults if fault), ""))
 
 
-def _taken(data: bytes, places: np.ndarray, width: int) -> np.ndarray:
+def _copy_items(data: bytes, places: np.ndarray, width: int) -> np.ndarray:
     """Copy width bytes from each place, as (n,) items of that size, which NumPy moves as units."""
     windows: np.ndarray = np.ndarray((len(data) - width + 1,), np.dtype(f"V{width}"), data, 0, (1,))
     return windows[places]
@@ -507,11 +507,11 @@ class _Gather:
         base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
         data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
         data = data.ljust(end - base, b"\0")
-        usual, lengths = self.source.usual(_taken(data, offsets - base, lead).view(np.uint8).reshape(-1, lead))
+        usual, lengths = self.source.usual(_copy_items(data, offsets - base, lead).view(np.uint8).reshape(-1, lead))
         past = offsets + lead + lengths > room
         lengths[past] = -1
         self.lengths[order] = lengths
-        self.rows.view(f"V{self.size}")[_as_slice(order), 0] = _taken(data, offsets - base + lead, self.size)
+        self.rows.view(f"V{self.size}")[_as_slice(order), 0] = _copy_items(data, offsets - base + lead, self.size)
         fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
         for place in np.flatnonzero(~usual).tolist():
             fault = self.single(chunk, int(offsets[place]), int(order[place])) or fault
@@ -530,7 +530,7 @@ class _Gather:
         return "" if self.lengths[row] >= 0 else f"chunk {chunk} ends before its messages do"
 
 
-def about_recovery(
+def recovery_warning(
     path: Path,
     *,
     messages: int,

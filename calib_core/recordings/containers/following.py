@@ -82,7 +82,7 @@ class FollowedFiles:
     @property
     def is_complete(self) -> bool:
         """Whether all files have been closed by their writer; a folder of ROS 2 then has its metadata."""
-        if not self._files or len({self._given(value.path) for value in self._files.values()}) < len(self._paths):
+        if not self._files or len({self._given_path(value.path) for value in self._files.values()}) < len(self._paths):
             return False
         closed = [followed.source.is_complete or _has_metadata(followed) for followed in self._files.values()]
         return all(closed) and not any(_is_unfinished_folder(path) for path in self._paths)
@@ -121,7 +121,7 @@ class FollowedFiles:
                 there[_identity(path)] = path
         return there
 
-    def _given(self, path: Path) -> Path:
+    def _given_path(self, path: Path) -> Path:
         """Return the path of the user's to which a file belongs."""
         return next(given for given in self._paths if path in _names(given) or given in path.parents)
 

@@ -45,7 +45,7 @@ class StatedAssumption:
     confirmed: bool
 
 
-def about_assumptions(assumptions: Sequence[Assumption]) -> list[DataWarning]:
+def assumption_warnings(assumptions: Sequence[Assumption]) -> list[DataWarning]:
     """Warn about each unconfirmed assumption."""
     return [
         DataWarning.reported("assumed", assumption.words, assumption_hint(assumption.confirm))

@@ -179,14 +179,14 @@ def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
     except sqlite3.Error as error:
         fault = " ".join(str(error).split())
         rows = _around_damage(connection, _last_row(connection, path), fault)
-    rows = replace(rows, missed=max(0, _counted(connection) - len(rows.columns) - rows.strange))
+    rows = replace(rows, missed=max(0, _count_rows(connection) - len(rows.columns) - rows.strange))
     if (np.diff(rows.columns[:, 2]) > 0).all():
         return rows
     _, first = np.unique(rows.columns[:, 2], return_index=True)
     return replace(rows, columns=rows.columns[np.sort(first)], repeated=len(rows.columns) - len(first))
 
 
-def _counted(connection: sqlite3.Connection) -> int:
+def _count_rows(connection: sqlite3.Connection) -> int:
     """Count the rows, which SQLite does in the table's smallest index; 0 if that is damaged."""
     try:
         return int(connection.execute("SELECT count(*) FROM messages").fetchone()[0])
@@ -265,7 +265,7 @@ def _rows_text(low: int, high: int) -> str:
     return f"from {low} on" if high == _NO_END else str(low) if low == high else f"{low} to {high}"
 
 
-def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
+def lost_row_warnings(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
     """Warn about what was lost in a database.
 
     Args:
@@ -435,7 +435,7 @@ class SqliteSource:
             self._indexes = self._sorted(rows.columns)
             known = {channel.id for channel in self.channels}
             unknown = sum(len(index) for number, index in self._indexes.items() if number not in known)
-            self.warnings = (*self.warnings, *about_rows(self.path, rows, unknown))
+            self.warnings = (*self.warnings, *lost_row_warnings(self.path, rows, unknown))
         empty = np.zeros(0, dtype=np.int64)
         return self._indexes.get(channel_id, MessageIndex(empty, empty, empty))
 

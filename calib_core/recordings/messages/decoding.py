@@ -88,7 +88,7 @@ class Message:
     def number(self, path: str) -> float:
         """Return a single number; path is a dotted name."""
         try:
-            return float(_at(self, path.split(".")))
+            return float(_value_at(self, path.split(".")))
         except (KeyError, TypeError, ValueError):
             return self._refuse(path, "a number")
 
@@ -100,10 +100,10 @@ class Message:
                 return value[path].astype(np.float64)
         if not isinstance(value, list):
             self._refuse(name, f"a list with {path}")
-        return np.array([_at(element, path.split(".")) for element in value], dtype=np.float64)
+        return np.array([_value_at(element, path.split(".")) for element in value], dtype=np.float64)
 
 
-def _at(element: Any, parts: list[str]) -> Any:
+def _value_at(element: Any, parts: list[str]) -> Any:
     for part in parts:
         element = element[part]
     return element

@@ -176,7 +176,7 @@ def stamp_files(
             f"{folder}: no times in the file names ({files[0].name}); name the files by their time since 1970 "
             "(19 digits for ns, 16 us, 13 ms, 10 s), or add a CSV with the columns file,time_ns to the folder"
         )
-    return _counted(folder, files, numbers)
+    return _stamps_by_count(folder, files, numbers)
 
 
 def _by_name(folder: Path, files: Sequence[Path], named: NamedTimes) -> StampedFiles:
@@ -216,7 +216,7 @@ def _like_files_of(known: PlainSource, folder: Path, files: Sequence[Path]) -> S
     return None
 
 
-def _counted(folder: Path, files: Sequence[Path], numbers: Mapping[Path, int]) -> StampedFiles:
+def _stamps_by_count(folder: Path, files: Sequence[Path], numbers: Mapping[Path, int]) -> StampedFiles:
     """Stamp numbered files 0.1 s apart."""
     counted = {file: TimeNs((number + 10) * _STEP_NS) for file, number in numbers.items()}
     warning = DataWarning.reported(
@@ -360,11 +360,13 @@ def times_in_names(stems: Sequence[str], zone_s: int | None = None) -> NamedTime
     for moments in _candidates(stems):
         found = [(place, moment) for place, moment in enumerate(moments) if moment is not None]
         if len(found) > (len(best.places) if best else 0):
-            best = _named(stems, found, zone_s) or best
+            best = _stamps_by_name(stems, found, zone_s) or best
     return best
 
 
-def _named(stems: Sequence[str], found: Sequence[tuple[int, WrittenMoment]], zone_s: int | None) -> NamedTimes | None:
+def _stamps_by_name(
+    stems: Sequence[str], found: Sequence[tuple[int, WrittenMoment]], zone_s: int | None
+) -> NamedTimes | None:
     """Return the times of one way to choose moments; None if they do not tell the files apart."""
     times = _times([moment for _, moment in found])
     if times is None or (len(found) > 1 and len(np.unique(times[0])) == 1) or _is_numbered_day(stems, found):

@@ -86,7 +86,7 @@ def size_of_images_beside(calibration: Path) -> tuple[int, int] | None:
     return None
 
 
-def _above(folder: Path) -> Iterator[Path]:
+def _folders_above(folder: Path) -> Iterator[Path]:
     """Yield the folders around a folder, as far up as data sets are deep."""
     yield from list(folder.absolute().parents)[:_LEVELS]
 
@@ -142,7 +142,7 @@ def _of_kitti_frames(folder: Path, files: Sequence[Path]) -> FolderCamera | None
 def _of_raw_kitti(folder: Path, image_size_px: tuple[int, int] | None) -> FolderCamera | None:
     """Read calib_cam_to_cam.txt: the rectified camera, or the raw one if the images have its size."""
     number = _number_of(folder)
-    file = next((above / _RAW_KITTI for above in _above(folder) if (above / _RAW_KITTI).is_file()), None)
+    file = next((above / _RAW_KITTI for above in _folders_above(folder) if (above / _RAW_KITTI).is_file()), None)
     if number is None or file is None:
         return None
     lines = _lines(file)
@@ -158,7 +158,7 @@ def _of_raw_kitti(folder: Path, image_size_px: tuple[int, int] | None) -> Folder
 def _of_nuscenes(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
     """Read the calibrated sensor of the folder's channel from the tables of a nuScenes data set."""
     tables = next(
-        (path for above in _above(folder) for path in sorted(above.glob("v1.0-*/calibrated_sensor.json"))), None
+        (path for above in _folders_above(folder) for path in sorted(above.glob("v1.0-*/calibrated_sensor.json"))), None
     )
     if tables is None:
         return None

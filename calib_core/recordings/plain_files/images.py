@@ -61,7 +61,7 @@ def open_image_folder(
 
     text = f"folder of images, {len(stamped.files)} files{_calibration_words(camera)}"
     source = stamped.source(folder, text, image_channel(topic_of(folder, "image")), message)
-    warnings = (*_about_faults(folder, faults, len(files)), *_about_ends(folder, sound), *source.warnings)
+    warnings = (*_fault_warnings(folder, faults, len(files)), *_end_warnings(folder, sound), *source.warnings)
     return replace(source, warnings=warnings, camera=camera, unreadable=faults)
 
 
@@ -73,7 +73,7 @@ def _checksum_fault(file: Path) -> str:
     return png_fault(data) if data.startswith(PNG_MAGIC) else ""
 
 
-def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple[DataWarning, ...]:
+def _fault_warnings(folder: Path, faults: Mapping[Path, str], count: int) -> tuple[DataWarning, ...]:
     if not faults:
         return ()
     file, fault = next(iter(faults.items()))
@@ -81,7 +81,7 @@ def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple
     return (DataWarning.reported("unreadable-pictures", what, "copy them again from their source if they matter"),)
 
 
-def _about_ends(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
+def _end_warnings(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
     cut = [file.name for file in files if is_cut_off(file)]
     if not 0 < len(cut) <= len(files) / 2:  # some cameras never write the end
         return ()

@@ -120,7 +120,7 @@ def bin_layout(files: Sequence[Path]) -> tuple[BinLayout | None, list[str]]:
         if others:
             faults.append(f"{layout.words}: {others} of {len(files)} files have another size")
             continue
-        points = _sampled(files, layout.dtype)
+        points = _sample_returns(files, layout.dtype)
         fitting = float(np.mean(layout.fits(points))) if len(points) else 0.0
         if fitting >= _ENOUGH:
             return layout, []
@@ -129,7 +129,7 @@ def bin_layout(files: Sequence[Path]) -> tuple[BinLayout | None, list[str]]:
     return None, faults
 
 
-def _sampled(files: Sequence[Path], dtype: "np.dtype[np.void]") -> np.ndarray:
+def _sample_returns(files: Sequence[Path], dtype: "np.dtype[np.void]") -> np.ndarray:
     """Return the first returns of some files spread over a folder."""
     filled = [file for file in files if file.stat().st_size]
     places = np.unique(np.linspace(0, len(filled) - 1, min(len(filled), _SAMPLED_FILES)).astype(np.int64))
@@ -165,7 +165,7 @@ def is_lidar_bin(files: Sequence[Path]) -> bool:
     """Return whether .bin files are a lidar's: x, y, z and an intensity as KITTI has them, and of no radar's layout."""
     if any(file.stat().st_size % 16 for file in files) or bin_layout(files)[0] is not None:
         return False
-    points = _sampled(files, np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")]))
+    points = _sample_returns(files, np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")]))
     sound = [*(np.abs(points[axis]) <= _FARTHEST_M for axis in "xyz"), points["intensity"] >= 0]
     return bool(np.mean(np.logical_and.reduce(sound)) >= _ENOUGH) if len(points) else False
 

@@ -234,7 +234,7 @@ def _open(path: Path, chunks: Sequence[Path], radar_start: str | None) -> PlainS
 
     source = PlainSource(
         path, stream.size, _container(chunks, scan, stamped.clock), cloud_channel(topic_of(path, "radar")), times, message,
-        (*_about_damage(path, scan), *stamped.warnings), stream.close, stamped.assumptions,
+        (*_damage_warnings(path, scan), *stamped.warnings), stream.close, stamped.assumptions,
     )  # fmt: skip
     return source
 
@@ -249,7 +249,7 @@ def _container(chunks: Sequence[Path], scan: "_Scan", clock: str) -> str:
     return ", ".join(words)
 
 
-def _about_damage(path: Path, scan: "_Scan") -> list[DataWarning]:
+def _damage_warnings(path: Path, scan: "_Scan") -> list[DataWarning]:
     steps = np.diff([packet.frame for _, packet in scan.packets])
     missing = int((steps[steps > 1] - 1).sum())
     if not (scan.broken or scan.strange_bytes or missing):
@@ -500,7 +500,7 @@ def stamp_packets(path: Path, packets: Sequence[Packet], start: str | None, topi
     Raises:
         RecordingError: --radar-start or the list of times is wrong.
     """
-    if start is None and (listed := _listed(path, len(packets))) is not None:
+    if start is None and (listed := _listed_times(path, len(packets))) is not None:
         order = np.argsort(listed, kind="stable")
         return StampedPackets(order, listed[order], f"times of {_table(path).name}")
     begin_ns, given_s = _start(start)
@@ -514,18 +514,18 @@ def stamp_packets(path: Path, packets: Sequence[Packet], start: str | None, topi
         assumptions.append(Assumption("time-start", topic, text, "--radar-start TIME"))
     if given_s is None:
         assumptions.append(
-            Assumption("time-unit", topic, _about_period(period_s), "--radar-start TIME,SECONDS_PER_FRAME")
+            Assumption("time-unit", topic, _period_note(period_s), "--radar-start TIME,SECONDS_PER_FRAME")
         )
     return StampedPackets(
         np.arange(len(packets)),
         times,
         f"{seconds:.4g} s per frame",
-        _about_restarts(path, restarts),
+        _restart_warnings(path, restarts),
         tuple(assumptions),
     )
 
 
-def _about_period(period_s: float | None) -> str:
+def _period_note(period_s: float | None) -> str:
     if period_s is None:
         return f"its processor cycles are not steady; {_DEFAULT_PERIOD_S} s per frame are assumed"
     return (
@@ -534,7 +534,7 @@ def _about_period(period_s: float | None) -> str:
     )
 
 
-def _about_restarts(path: Path, restarts: int) -> tuple[DataWarning, ...]:
+def _restart_warnings(path: Path, restarts: int) -> tuple[DataWarning, ...]:
     if not restarts:
         return ()
     return (
@@ -597,7 +597,7 @@ def _table(path: Path) -> Path:
     return next((table for table in beside if table.is_file()), beside[0])
 
 
-def _listed(path: Path, count: int) -> TimesNs | None:
+def _listed_times(path: Path, count: int) -> TimesNs | None:
     """Read one time per packet from a table beside the stream; None if there is none.
 
     Raises:

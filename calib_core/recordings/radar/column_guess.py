@@ -252,7 +252,7 @@ def choose(
         elif not one.meaning.second and one.meaning.kind != "vague":
             matched.setdefault(one.quantity, one)
     first = [one for one in matches if not one.meaning.sigma and not one.meaning.second]
-    matched |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
+    matched |= _columns_of_one_position(first, ("x", "y", "z")) | _columns_of_one_position(first, ("vx", "vy", "vz"))
     second = (one for one in matches if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
     others = tuple(one.name for one in second) if "azimuth" in matched else ()
     vague = [one for one in first if one.meaning.kind == "vague"]
@@ -272,13 +272,15 @@ def _matches_of_message(columns: Sequence[DescribedColumn]) -> list[ColumnMatch]
     """Return the columns that mean something; none if one of them is not a radar's."""
     if any(has_word(column.name, *_NOT_RADARS) for column in columns):
         return []
-    matches = [one for one in (_match(column, name) for column, name in _stripped(columns)) if one is not None]
+    matches = [
+        one for one in (_match(column, name) for column, name in _without_common_word(columns)) if one is not None
+    ]
     if any(has_word(column.name, *_SIZES) for column in columns):
         matches = [matched for matched in matches if not has_word(matched.name, "height")]  # of an object
     return matches
 
 
-def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
+def _without_common_word(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
     """Return the columns with their names without a first word that most of them share."""
     firsts = Counter(words_of(column.name)[:1] for column in columns)
     (common, count), *_ = firsts.most_common(1) or [((), 0)]
@@ -368,7 +370,7 @@ def split_unit(written: str) -> tuple[str, str]:
     return (bracketed["name"], bracketed["unit"].strip()) if bracketed else (text, "")
 
 
-def _together(found: Sequence[ColumnMatch], axes: tuple[str, str, str]) -> dict[str, ColumnMatch]:
+def _columns_of_one_position(found: Sequence[ColumnMatch], axes: tuple[str, str, str]) -> dict[str, ColumnMatch]:
     """Choose x and y (and z) of one position, not of two."""
     stems: dict[tuple[str, ...], dict[str, ColumnMatch]] = {}
     for matched in found:

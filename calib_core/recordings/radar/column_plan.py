@@ -413,9 +413,9 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     if "amplitude" in given:
         made = replace(made, amplitude=given["amplitude"].column, amplitude_scale=given["amplitude"].scale)
     made = _sigma(made, given)
-    kept = tuple(assumption for assumption in start.assumptions if not _settled(assumption, given, made))
+    kept = tuple(assumption for assumption in start.assumptions if not _is_settled(assumption, given, made))
     readings = tuple(
-        reading for reading in start.readings if reading.quantity not in given and not _replaced(reading, made)
+        reading for reading in start.readings if reading.quantity not in given and not _is_replaced(reading, made)
     )
     return replace(
         made,
@@ -425,12 +425,12 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     )
 
 
-def _replaced(reading: ColumnReading, made: ColumnPlan) -> bool:
+def _is_replaced(reading: ColumnReading, made: ColumnPlan) -> bool:
     gone = _CARTESIAN if made.polar else _POLAR
     return reading.quantity in gone or (reading.quantity == "velocity" and not made.velocity)
 
 
-def _settled(one: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
+def _is_settled(one: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
     unit = one.assumption.key.endswith("-unit")
     if set(one.quantities) & set(_CARTESIAN if made.polar else _POLAR):
         return True  # about columns that are no longer read
@@ -468,7 +468,7 @@ def _position(start: ColumnPlan, given: Mapping[str, MappedColumn], assumed: lis
             columns.append(one.column)
             scales.append(one.scale if one.unit else one.sign * (usual or 1.0))
             if not one.unit and usual is None:
-                assumed.append(_about_unit(one))
+                assumed.append(_unit_assumption(one))
         elif before is not None:
             columns.append(before[0])
             scales.append(before[1])
@@ -507,7 +507,7 @@ def _scales(plan: ColumnPlan) -> tuple[float, float, float]:
     return plan.scales[0], factor * plan.scales[1], factor * plan.scales[2]
 
 
-def _about_unit(one: MappedColumn) -> ColumnAssumption:
+def _unit_assumption(one: MappedColumn) -> ColumnAssumption:
     unit = next(iter(MAPPED_UNITS[one.quantity]))
     return ColumnAssumption(
         Assumption(
@@ -528,7 +528,7 @@ def _speed(
     if one is not None:
         same = start.doppler == one.column
         if not one.unit and not same:
-            assumed.append(_about_unit(one))
+            assumed.append(_unit_assumption(one))
         scale = one.scale if one.unit or not same else one.sign * abs(start.doppler_scale)
         return replace(made, doppler=one.column, doppler_scale=scale, velocity=())
     if made.velocity and made.position != start.position:

@@ -153,7 +153,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     position = _position(plan, column)
     if plan.azimuth_from is not None:
-        position = _turned(plan, position, _floats(column(plan.azimuth_from)))
+        position = _at_other_azimuth(plan, position, _floats(column(plan.azimuth_from)))
     n = len(position)
     amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
     doppler = _doppler(plan, column, position)
@@ -203,7 +203,7 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
     return cartesian_from_polar(position)
 
 
-def _turned(plan: ColumnPlan, position: Points3, azimuth: Values) -> Points3:
+def _at_other_azimuth(plan: ColumnPlan, position: Points3, azimuth: Values) -> Points3:
     """Return positions with their range and elevation at another azimuth, in the unit and with the sign of the first."""
     degrees = plan.degrees or plain_name(plan.azimuth_from or "").endswith("deg")
     scale = plan.azimuth_sign * (plan.scales[1] if plan.polar else 1.0)

@@ -150,7 +150,7 @@ def merged(parts: Sequence[RadarScans], spreads: Sequence[Spread], repeats: Sequ
             whole, spread = scans, spreads[part]
             continue
         both = Spread(np.hypot(spread.step, spreads[part].step), max(spread.doppler_mps, spreads[part].doppler_mps))
-        whole = _joined(whole, scans.take(np.flatnonzero(~_reported(whole, scans, both))))
+        whole = _stack_topics(whole, scans.take(np.flatnonzero(~_reported(whole, scans, both))))
     assert whole is not None
     return _renumbered(whole)
 
@@ -174,7 +174,7 @@ def _with_alternatives(first: RadarScans, others: Sequence[RadarScans], spread: 
     return _stacked(parts, np.concatenate(labels))
 
 
-def _joined(whole: RadarScans, scans: RadarScans) -> RadarScans:
+def _stack_topics(whole: RadarScans, scans: RadarScans) -> RadarScans:
     """Stack the returns of two topics; the alternatives of the one stay apart from those of the other."""
     if whole.alternative_of is None and scans.alternative_of is None:
         return _stacked([whole, scans], None)
@@ -238,7 +238,7 @@ def matches(one: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool
     counts = np.where(np.isfinite(mine), high - low, 0)
     a = np.repeat(np.arange(len(mine)), counts)
     b = order[np.repeat(low - np.cumsum(counts) + counts, counts) + np.arange(len(a))]
-    apart, inside = _apart(one, other, a, b, spread, azimuth=azimuth)
+    apart, inside = _squared_distances(one, other, a, b, spread, azimuth=azimuth)
     a, b, apart = a[inside], b[inside], apart[inside]
     nearest = _best(a, apart) & _best(b, apart)
     return a[nearest], b[nearest]
@@ -250,7 +250,7 @@ def _sortable(scans: RadarScans) -> Values:
     return np.asarray(np.where(range_m < 0.5 * _SPAN_M, range_m + _SPAN_M * scans.scan_of_return(), np.nan))
 
 
-def _apart(
+def _squared_distances(
     one: RadarScans, other: RadarScans, a: Indices, b: Indices, spread: Spread, *, azimuth: bool
 ) -> tuple[Values, Flags]:
     """Return the squared distances (k,) of rows, in spreads, and which are within; unknown speeds agree with all."""

@@ -77,7 +77,7 @@ class ScanBlocks(ABC):
         """Decode the scans with start <= stamp <= end."""
         first = 0 if start is None else int(np.searchsorted(self.times_ns, start, side="left"))
         last = len(self.times_ns) if end is None else int(np.searchsorted(self.times_ns, end, side="right"))
-        return self._between(first, max(first, last))
+        return self._scans_between(first, max(first, last))
 
     def around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
         """Decode the scans within half_window_s of any of the times, each once."""
@@ -88,14 +88,14 @@ class ScanBlocks(ABC):
             wanted[np.searchsorted(self.times_ns, int(time) + half, side="right")] -= 1
         inside = np.concatenate([[False], np.cumsum(wanted)[:-1] > 0, [False]])
         edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
-        return RadarScans.joined([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
+        return RadarScans.joined([self._scans_between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
 
-    def _between(self, first: int, last: int) -> RadarScans:
+    def _scans_between(self, first: int, last: int) -> RadarScans:
         """Return the scans first to last - 1."""
         pieces = []
         for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
             block, base = self._block(number), number * _BLOCK_SCANS
-            pieces.append(_cut(block, max(first - base, 0), min(last - base, len(block))))
+            pieces.append(_keep_scans(block, max(first - base, 0), min(last - base, len(block))))
         return RadarScans.joined(pieces)
 
     def _block(self, number: int) -> RadarScans:
@@ -126,7 +126,7 @@ class ScanBlocks(ABC):
         return self.decoded(np.unique(places.astype(np.int64)))
 
 
-def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
+def _keep_scans(scans: RadarScans, first: int, last: int) -> RadarScans:
     """Keep the scans first to last - 1."""
     if first == 0 and last == len(scans):
         return scans
@@ -255,7 +255,7 @@ class RadarStream(ScanBlocks):
         for row in rows.tolist():
             with contextlib.suppress(RecordingError):  # reported when the scan itself is read
                 found.append(layout.returns(self.topic.payload(row)))
-        return _joined(found)
+        return _join_returns(found)
 
     def decoded(self, scans: np.ndarray) -> RadarScans:
         """Decode the scans with the given numbers, ascending, without caching."""
@@ -269,7 +269,7 @@ class RadarStream(ScanBlocks):
         returns = [self._returns(int(message)) for message in messages]
         for message, scan in zip(messages, returns, strict=True):
             self._count(np.array([message]), np.array([len(scan)]), scan)
-        return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
+        return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _join_returns(returns))
 
     def _decoded_clouds(self, layout: CloudLayout, scans: np.ndarray) -> RadarScans | None:
         """Decode clouds with equal layout at once; None if they must be read one by one."""
@@ -317,7 +317,7 @@ class RadarStream(ScanBlocks):
             returns.points_radar_m[short] = np.nan
             self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is truncated"))
         misfits = np.flatnonzero(misfit).tolist()
-        returns = _joined([returns, no_returns()]) if misfits else returns  # a writable copy
+        returns = _join_returns([returns, no_returns()]) if misfits else returns  # a writable copy
         for row in misfits:
             self._reread(layout, int(messages[row]), row, returns)
         return _stacked(self.times_ns[scans], counts.tolist(), returns)
@@ -335,7 +335,7 @@ class RadarStream(ScanBlocks):
             getattr(returns, name)[row] = getattr(single, name)[0]
 
 
-def _joined(scans: Sequence[Returns]) -> Returns:
+def _join_returns(scans: Sequence[Returns]) -> Returns:
     if len(scans) < 2:
         return scans[0] if scans else no_returns()
     return Returns(

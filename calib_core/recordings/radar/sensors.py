@@ -235,7 +235,7 @@ def relation(one: Examined, other: Examined) -> Relation:
     first, second = both
     fewer = min(_count(first), _count(second))
     if alternating:
-        return "apart" if _turned(one, other, first, second, spread) else "ranges"
+        return "apart" if _are_turned(one, other, first, second, spread) else "ranges"
     if fewer < _FEWEST:
         return "apart"
     if len(matches(first, second, spread)[0]) >= _SAME_SHARE * fewer:
@@ -339,7 +339,7 @@ def _are_ranges(one: Examined, other: Examined, first: RadarScans, second: Radar
     return agree >= _AGREE or (agree > _CONTRADICT and named and complementary)
 
 
-def _turned(one: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
+def _are_turned(one: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
     """Return whether two topics show the same ranges in other directions, as radars of two mountings do."""
     near, far = (_in_common(scans, one.figures, other.figures) for scans in (first, second))
     if min(_count(near), _count(far)) < _FEWEST:

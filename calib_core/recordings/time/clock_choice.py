@@ -178,7 +178,7 @@ def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> C
     if any(receive_fault(stamps) for stamps in both):
         return _without_the_recorder(both)
     faults = tuple(header_fault(stamps) for stamps in both)
-    if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _near(radar, camera)):
+    if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _are_near(radar, camera)):
         return _both_usable(radar, camera)
     warnings = [_fell_back(stamps, fault) for stamps, fault in zip(both, faults, strict=True) if fault]
     for number, (sound, fault) in enumerate(zip(both, faults, strict=True)):
@@ -187,7 +187,11 @@ def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> C
             if abs(lag_s) <= 1.0:
                 clocks: tuple[Literal["header", "receive"], ...] = ("receive", "header")
                 return ClockChoice(clocks if number else clocks[::-1], tuple(warnings))
-            warnings.append(_mixed(f"the stamps of {sound.topic} differ from the receive times by {span_text(lag_s)}"))
+            warnings.append(
+                _mixed_clocks_warning(
+                    f"the stamps of {sound.topic} differ from the receive times by {span_text(lag_s)}"
+                )
+            )
     return ClockChoice(("receive", "receive"), tuple(warnings))
 
 
@@ -239,19 +243,19 @@ def _from_boot(stamps: Stamps) -> bool:
     return ancient(stamps.header_ns) and not constant and disorder(stamps.header_ns) is None
 
 
-def _near(radar: Stamps, camera: Stamps) -> bool:
+def _are_near(radar: Stamps, camera: Stamps) -> bool:
     return abs(radar.offset_ns - camera.offset_ns) <= _AGREE_NS
 
 
 def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
     if not (len(radar.receive_ns) and len(camera.receive_ns)):
         return ClockChoice(("header", "header"), ())
-    if _near(radar, camera):
+    if _are_near(radar, camera):
         worst_s = _divergence_s(radar, camera)
         if worst_s <= _AGREE_NS / NS_PER_S:
             return ClockChoice(("header", "header"), ())
         divergence = f"the stamps of {radar.topic} and {camera.topic} diverge during the recording, by up to {span_text(worst_s)}"
-        return ClockChoice(("receive", "receive"), (_mixed(divergence),))
+        return ClockChoice(("receive", "receive"), (_mixed_clocks_warning(divergence),))
     assert radar.header_ns is not None
     assert camera.header_ns is not None
     if not _overlap(radar.receive_ns, camera.receive_ns) and _overlap(radar.header_ns, camera.header_ns):
@@ -260,7 +264,7 @@ def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
     return ClockChoice(
         ("receive", "receive"),
         (
-            _mixed(
+            _mixed_clocks_warning(
                 f"the stamps of {radar.topic} and {camera.topic} come from clocks that are {span_text(apart_s)} apart"
             ),
         ),
@@ -295,7 +299,7 @@ def _overlap(a: TimesNs, b: TimesNs) -> bool:
     return bool(a.min() <= b.max() and b.min() <= a.max())
 
 
-def _mixed(why: str) -> DataWarning:
+def _mixed_clocks_warning(why: str) -> DataWarning:
     return DataWarning.reported(
         "mixed-clocks",
         f"{why}: receive times are used for both sensors",

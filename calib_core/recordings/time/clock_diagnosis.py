@@ -88,19 +88,19 @@ class ClockDiagnosis:
             (self.one_per_return, "one message per return: stamps differ within a scan"),
             (
                 self.repeated_stamps > 0 and not self.one_per_return,
-                f"{_counted(self.repeated_stamps, 'stamp repeats', 'stamps repeat')} the previous one",
+                f"{_count(self.repeated_stamps, 'stamp repeats', 'stamps repeat')} the previous one",
             ),
             (
                 self.backward_stamps > 0,
-                f"{_counted(self.backward_stamps, 'stamp goes', 'stamps go')} backwards, by up to {self.worst_step_back_s:.3f} s",
+                f"{_count(self.backward_stamps, 'stamp goes', 'stamps go')} backwards, by up to {self.worst_step_back_s:.3f} s",
             ),
             (
                 self.jumps > 0,
-                f"the delay jumps {_counted(self.jumps, 'time', 'times')} by up to {span_text(self.largest_jump_s)}",
+                f"the delay jumps {_count(self.jumps, 'time', 'times')} by up to {span_text(self.largest_jump_s)}",
             ),
             (self._drifts, f"the stamps drift by {self.drift_s * 1e3:.0f} ms ({self.drift_ppm or 0:.0f} ppm)"),
             (self.islands > 1, f"{self.islands} separate stretches of data, {span_text(self.covered_s)} in total"),
-            (self.gaps > 0, f"{_counted(self.gaps, 'gap', 'gaps')}, the longest {span_text(self.longest_gap_s)}"),
+            (self.gaps > 0, f"{_count(self.gaps, 'gap', 'gaps')}, the longest {span_text(self.longest_gap_s)}"),
         ]
         return tuple(text for there, text in found if there)
 
@@ -109,7 +109,7 @@ class ClockDiagnosis:
         return self.drift_ppm is not None and abs(self.drift_s) > _DRIFT_S
 
 
-def _counted(count: int, one: str, many: str) -> str:
+def _count(count: int, one: str, many: str) -> str:
     return f"{count} {one if count == 1 else many}"
 
 
@@ -230,7 +230,7 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
     )
 
 
-def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
+def clock_warnings(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
     """Warn about clock problems that can degrade a calibration."""
     warnings = []
     for clock in found:
@@ -239,7 +239,7 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
             warnings.append(
                 DataWarning.reported(
                     "clock-jumps",
-                    f"the stamps of {clock.topic} jump relative to the receive times, {_counted(clock.jumps, 'time', 'times')} "
+                    f"the stamps of {clock.topic} jump relative to the receive times, {_count(clock.jumps, 'time', 'times')} "
                     f"and by up to {span_text(clock.largest_jump_s)}: its clock was set during the recording, or the driver hung",
                     "compare with --clock receive, and keep only the clicks before or after the jump",
                 )

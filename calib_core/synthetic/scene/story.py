@@ -289,7 +289,7 @@ def tell_story(rng: np.random.Generator, positions_m: Points3, options: Simulati
         away = position[:2] / np.linalg.norm(position[:2])
         stands.append(position[:2] + _BEHIND_M * away)
         start_s = script.put_down(stands[index], index, position[:2])
-        aside_m = _aside(rng, stands[index], away, narrow)
+        aside_m = _waiting_place(rng, stands[index], away, narrow)
         if options.person_leaves:
             script.leave(stands[index], dwell_s, index, position[:2])
         else:
@@ -322,7 +322,7 @@ def _waved_script(waving_s: float) -> Script:
     return script
 
 
-def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:
+def _waiting_place(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:
     """Choose where the person waits: to one side and slightly behind, or in a narrow place straight behind."""
     if narrow:
         return behind + rng.uniform(1.3, 1.7) * away + np.array([0.0, rng.uniform(-0.3, 0.3)])

@@ -28,7 +28,7 @@ from calib_core.results import Calibration, DataWarning, PairResult
 from calib_core.results.actions import ChooseReturn, MeasureCameraPosition, ReviewPairs, SetOption
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic.rig import RigOptions, random_rig
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.scans import scan_of
 
@@ -60,7 +60,7 @@ def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions)
     outcome = calibrate_pairs(pairs, camera, options)
     if isinstance(outcome, Unsolvable):
         return (DataWarning(outcome.code, outcome.facts), *outcome.suspected)
-    assert all(told(warning).message and told(warning).hint for warning in outcome.warnings)
+    assert all(warning_remark(warning).message and warning_remark(warning).hint for warning in outcome.warnings)
     return outcome.warnings
 
 
@@ -135,7 +135,7 @@ def test_placements_in_one_corner_give_a_weak_geometry():
     (weak,) = (one for one in warnings(simulated.pairs, simulated.camera, FREE) if one.code == "weak-geometry")
     assert weak.facts["position_cm"] > 10.0
     assert weak.facts["farthest_m"] == pytest.approx(10.0, abs=0.1)
-    assert told(weak).action == MeasureCameraPosition()
+    assert warning_remark(weak).action == MeasureCameraPosition()
 
 
 def test_many_outliers_are_counted_and_named():
@@ -143,7 +143,7 @@ def test_many_outliers_are_counted_and_named():
     (many,) = (one for one in warnings(simulated.pairs, simulated.camera, measured()) if one.code == "many-outliers")
     assert many.facts["pairs"] == 20
     assert len(many.facts["ids"]) > 7
-    assert told(many).action == ReviewPairs(tuple(many.facts["ids"]))
+    assert warning_remark(many).action == ReviewPairs(tuple(many.facts["ids"]))
 
 
 def test_few_pairs_are_reported():
@@ -176,7 +176,7 @@ def test_two_radar_positions_that_fit_one_click_are_reported():
         if one.code == "uncertain-association"
     )
     assert warning.facts["ids"] == ["p1"]
-    assert told(warning).action == ChooseReturn(("p1",))
+    assert warning_remark(warning).action == ChooseReturn(("p1",))
 
 
 def ambiguous(count: int) -> tuple[SimulatedPairs, list[Pair]]:
@@ -425,7 +425,7 @@ def test_stamps_that_are_a_placement_off_are_found(rooftop, ahead_s):
     outcome = calibrate(clicks, moved_scans, camera)
     (warning,) = clocks_apart(outcome.suspected if isinstance(outcome, Unsolvable) else outcome.warnings[:1])
     assert warning.facts["apart_s"] == pytest.approx(ahead_s, abs=2.0)
-    assert told(warning).action == SetOption("clock", "receive")
+    assert warning_remark(warning).action == SetOption("clock", "receive")
 
 
 @pytest.mark.parametrize("ahead_s", [37.0, -37.0, 18.0, -18.0])
@@ -435,7 +435,7 @@ def test_clocks_of_two_time_scales_are_named_with_the_seconds(rooftop, ahead_s):
     outcome = calibrate(clicks, moved_scans, camera)
     (warning,) = clocks_apart(outcome.suspected if isinstance(outcome, Unsolvable) else outcome.warnings[:1])
     assert warning.facts["apart_s"] == ahead_s
-    assert told(warning).action == SetOption("radar_late", f"{ahead_s:.0f}")
+    assert warning_remark(warning).action == SetOption("radar_late", f"{ahead_s:.0f}")
 
 
 ROWS, PER_ROW = 4, 6

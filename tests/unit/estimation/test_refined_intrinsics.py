@@ -16,7 +16,7 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, RefiningOptions
 from calib_core.results import Calibration
 from calib_core.results.actions import CalibrateLens
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.view.figures import refined_sentences
 
 TOLD = WrongLens("focal 2 %", refined=True, scale_told=True, alone=True)
@@ -50,7 +50,7 @@ def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says
     assert 0.4 < np.sqrt(((errors / sigmas) ** 2).mean()) < 1.6
     (warning,) = [one for one in refined(UNTOLD).warnings if one.code == "lens-or-radar-scale"]
     assert [one.name for one in warning.facts["scales"]] == ["azimuth_scale", "elevation_scale"]
-    assert told(warning).action == CalibrateLens()
+    assert warning_remark(warning).action == CalibrateLens()
 
 
 def test_refining_with_a_true_covariance_does_not_make_the_pose_worse():
@@ -156,7 +156,7 @@ def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal):
     (warning,) = [one for one in found.warnings if one.code == "intrinsics-suspected"]
     (focal,) = [one for one in warning.facts["refined_too_far"] if one.name == "focal_length"]
     assert focal.value < -3.0 * focal.prior_sigma
-    assert told(warning).action == CalibrateLens()
+    assert warning_remark(warning).action == CalibrateLens()
 
 
 @pytest.mark.parametrize("k1", [0.35, 0.4, 0.5, 0.6])

@@ -9,7 +9,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording, recording_summary
 from calib_core.recordings.time.clock_choice import Stamps, choose_clock, choose_clocks, header_fault
-from calib_core.recordings.time.clock_diagnosis import about_clocks, diagnose
+from calib_core.recordings.time.clock_diagnosis import clock_warnings, diagnose
 from calib_core.recordings.topics import Rhythm
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -262,7 +262,7 @@ def changed(where, by_ns):
 
 def test_sound_clocks_give_no_remarks():
     found = look(SOUND_NS)
-    assert (found.remarks, about_clocks([found])) == ((), [])
+    assert (found.remarks, clock_warnings([found])) == ((), [])
     assert (found.reason, found.messages, found.islands, found.gaps) == ("the stamps are sound", 2000, 1, 0)
     assert found.delay_s == pytest.approx(0.02)
     assert found.period_s == pytest.approx(0.1)
@@ -285,7 +285,7 @@ def test_irregular_stamps_give_remarks(header_ns, remark, code):
     found = look(header_ns, times_ns=np.sort(header_ns[header_ns != 0]))
     small = "20 ms" in remark
     assert (remark in found.remarks) != small
-    assert [warning.code for warning in about_clocks([found])] == ([code] if code else [])
+    assert [warning.code for warning in clock_warnings([found])] == ([code] if code else [])
 
 
 def test_islands_and_gaps_of_data_are_counted():
@@ -295,7 +295,7 @@ def test_islands_and_gaps_of_data_are_counted():
     assert found.covered_s == pytest.approx(199.7, abs=0.01)
     assert Rhythm.of(times).rate_hz == pytest.approx(10.0), "nothing happens between islands, which is no slower rate"
     assert any(remark.startswith("3 separate stretches") for remark in found.remarks)
-    (warning,) = about_clocks([found])
+    (warning,) = clock_warnings([found])
     assert warning.code == "islands"
     assert "up to 56.7 minutes" in warning.facts["message"]
     dropped = look(np.delete(SOUND_NS, np.s_[700:720]), np.delete(LONG_RECEIVE_NS, np.s_[700:720]))
@@ -308,7 +308,7 @@ def test_stretches_that_both_sensors_have_are_one_warning():
         diagnose(stamps(times, times, topic), times_ns=times, chosen="header", requested="auto")
         for topic in ("/radar", "/camera")
     ]
-    (warning,) = about_clocks(both)
+    (warning,) = clock_warnings(both)
     assert warning.code == "islands"
     assert warning.facts["message"].startswith("/radar and /camera ")
 

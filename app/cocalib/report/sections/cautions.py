@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from calib_core.results import DataWarning
 from calib_core.results.verdict import by_consequence, consequence_of
 from calib_core.words.outcomes import in_sentences
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence
@@ -55,7 +55,7 @@ def _assumed(subject: ReportSubject) -> tuple[DataWarning, ...]:
 
 
 def _item(warning: DataWarning) -> Markup:
-    sign, said = _sign(_SIGNS[consequence_of(warning.code)]), told(warning)
+    sign, said = _sign(_SIGNS[consequence_of(warning.code)]), warning_remark(warning)
     hint = tag("b", sentence(str(said.hint)))
     return tag("li", sign, tag("code", warning.code), " ", sentence(str(said.message)), " ", hint)
 

@@ -29,7 +29,7 @@ def pair_table(rows: ResidualRows) -> Markup | None:
     """Return the table; None without pairs."""
     if not len(rows):
         return None
-    shown = _shown(rows)
+    shown = _rows_to_show(rows)
     note = (
         f"{len(shown)} of {len(rows)} clicks: those with the largest residuals; all are in the calibration's file."
         if len(shown) < len(rows)
@@ -50,7 +50,7 @@ def pair_table(rows: ResidualRows) -> Markup | None:
     )
 
 
-def _shown(rows: ResidualRows) -> list[int]:
+def _rows_to_show(rows: ResidualRows) -> list[int]:
     """Return the indices of the rows to show, in the order of the pairs."""
     if len(rows) <= _MOST:
         return list(range(len(rows)))
@@ -68,8 +68,8 @@ def _row(rows: ResidualRows, index: int) -> Markup:
         f"{rows.elevations_deg[index]:.1f}",
         f"{u:.1f}",
         f"{v:.1f}",
-        _signed(right),
-        _signed(down),
+        _signed_number(right),
+        _signed_number(down),
         plain(float(rows.lengths_px[index])),
         plain(float(rows.held_out_px[index])),
         "< 0.01" if probability < 0.01 else plain(probability, 2),
@@ -81,5 +81,5 @@ def _row(rows: ResidualRows, index: int) -> Markup:
     )
 
 
-def _signed(value: float) -> str:
+def _signed_number(value: float) -> str:
     return f"{value:+.1f}" if np.isfinite(value) else "–"

@@ -77,7 +77,7 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
     yield "report by", f"cocalib {subject.version}"
     if file is not None:
         made = file.provenance
-        yield from _known(
+        yield from _known_rows(
             ("vehicle", _vehicle(file.vehicle)),
             ("session", file.vehicle.session),
             ("serials", _serials(file.vehicle)),
@@ -113,7 +113,7 @@ def _serials(note: VehicleNote) -> str | None:
     return ", ".join(f"{what} {serial}" for what, serial in stated if serial) or None
 
 
-def _known(*rows: tuple[str, str | None]) -> Iterator[tuple[str, str]]:
+def _known_rows(*rows: tuple[str, str | None]) -> Iterator[tuple[str, str]]:
     yield from ((name, value) for name, value in rows if value)
 
 
@@ -133,14 +133,14 @@ def _lens(camera: Camera) -> str:
 
 def _options(options: CalibrationOptions) -> str:
     """Return the method, and every option that is not at its default."""
-    changed = [f"{name} = {value}" for name, value in _changed(options, type(options)()) if name != "method"]
+    changed = [f"{name} = {value}" for name, value in _changed_options(options, type(options)()) if name != "method"]
     return f"method {options.method}; " + ("; ".join(changed) if changed else "all others at their defaults")
 
 
-def _changed(given: Any, usual: Any, before: str = "") -> Iterator[tuple[str, str]]:
+def _changed_options(given: Any, usual: Any, before: str = "") -> Iterator[tuple[str, str]]:
     for field in fields(given):
         value, default = getattr(given, field.name), getattr(usual, field.name)
         if is_dataclass(value) and type(value) is type(default):
-            yield from _changed(value, default, f"{before}{field.name}.")
+            yield from _changed_options(value, default, f"{before}{field.name}.")
         elif value != default:
             yield f"{before}{field.name}", f"{value:.6g}" if isinstance(value, float) else str(value)

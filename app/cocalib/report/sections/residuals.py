@@ -44,21 +44,21 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_ima
         notes.append(f"One in {every} pairs is drawn.")
     plots: list[Child] = [
         _vectors(calibration, rows, every, with_image=with_image),
-        _against(rows, rows.ranges_m, every, ("Length against range", "range [m]", range_sentence(rows))),
-        _against(
+        _scatter_plot(rows, rows.ranges_m, every, ("Length against range", "range [m]", range_sentence(rows))),
+        _scatter_plot(
             rows,
             rows.azimuths_deg,
             every,
             ("Length against azimuth", "azimuth [deg], left is positive", azimuth_sentence(rows)),
             mirrored=True,
         ),
-        _against(
+        _scatter_plot(
             rows,
             from_middle,
             every,
             ("Length across the image", "distance from the middle [px]", place_sentence(rows, size_px)),
         ),
-        _against(
+        _scatter_plot(
             rows, rows.times_s, every, ("Length against time", "time since the first pair [s]", time_sentence(rows))
         ),
         _lengths(rows),
@@ -127,7 +127,7 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_i
     return captioned(f"Click to reprojection{times}", image, words)
 
 
-def _against(
+def _scatter_plot(
     rows: ResidualRows, values: Values, every: int, words: tuple[str, str, str], *, mirrored: bool = False
 ) -> Markup:
     heading, label, said = words

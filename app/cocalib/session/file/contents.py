@@ -91,7 +91,7 @@ def read_contents(folder: GuardedFolder, facts: RecordingFacts | None = None) ->
         facts = facts_of(recordings[0])
     else:
         require_same_recording(recordings[0], facts, folder.path)
-    return _together(journal, copy, recordings[0], facts)
+    return _merged_contents(journal, copy, recordings[0], facts)
 
 
 def rewrite(folder: GuardedFolder, found: Contents) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ def _read(folder: GuardedFolder, name: str) -> FoundJournal | None:
     return None if data is None else read_journal(data, str(folder.path / name))
 
 
-def _together(
+def _merged_contents(
     journal: FoundJournal | None, copy: FoundJournal | None, recording: RecordingForm, facts: RecordingFacts
 ) -> Contents:
     """Follow the chain from the sound first line through both files, so that what one has lost comes from the other."""
@@ -127,7 +127,7 @@ def _together(
     while more := max((following(found.lines, lines[-1].sum) for found in files), key=len):
         lines += [one.line for one in more]
         steps += [one.step for one in more]
-    replayed = _replayed(steps, facts)
+    replayed = _replay(steps, facts)
     sums = {line.sum for line in lines}
     agree = all(sums.issuperset(found.sums[0 if found.recording else 1 :]) for found in files)
     faults = [*_faults(journal, ""), *_faults(copy, "in the copy, ")]
@@ -166,7 +166,7 @@ def _faults(found: FoundJournal | None, where: str) -> tuple[str, ...]:
     return tuple(faults)
 
 
-def _replayed(steps: Sequence[Step], facts: RecordingFacts) -> _Replayed:
+def _replay(steps: Sequence[Step], facts: RecordingFacts) -> _Replayed:
     """Apply the steps from an empty session on, up to one that does not fit."""
     history = History()
     for number, step in enumerate(steps):

@@ -62,9 +62,9 @@ def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFo
         for folder in folders
         if (candidate := _candidate(folder)) is not None and is_same_recording(candidate.recording, facts)
     ]
-    found = _chosen(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
+    found = _choose_newest(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
     return FoundFolder(
-        found.path, (*found.warnings, *_about_closed([each for each in folders if _is_of(each, paths[0])]))
+        found.path, (*found.warnings, *_closed_folder_warnings([each for each in folders if _is_of(each, paths[0])]))
     )
 
 
@@ -89,11 +89,11 @@ def remembered_map(folder: Path) -> tuple[str, ...]:
     return next((step.column_map for step in reversed(steps) if isinstance(step, ColumnsMapped)), ())
 
 
-def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
+def _choose_newest(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
     """Choose the newest session that can be continued, and tell about all others."""
     usable = [candidate for candidate in same if has_dates(candidate.recording) and is_writable(candidate.path)]
     chosen = usable[0] if usable else None
-    warnings = [_about(candidate, facts) for candidate in same if candidate is not chosen]
+    warnings = [_other_session_warning(candidate, facts) for candidate in same if candidate is not chosen]
     if chosen is None:
         return FoundFolder(named, tuple(warnings))
     of = "" if chosen.recording.name == facts.name else f" of '{chosen.recording.name}'"
@@ -102,7 +102,7 @@ def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> F
     return FoundFolder(chosen.path, (DataWarning.reported("session-of-other-name", message, hint), *warnings))
 
 
-def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
+def _other_session_warning(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
     """Tell about a session of the same stamps that is not continued."""
     of = f"the session of '{candidate.recording.name}' in {candidate.path}"
     message = f"{of} has the same frames as {facts.name} and is not used"
@@ -122,7 +122,7 @@ def _is_of(folder: Path, recording: Path) -> bool:
     return folder.parent == recording.parent and folder.name.startswith(f"{recording.name}.")
 
 
-def _about_closed(folders: Sequence[Path]) -> tuple[DataWarning, ...]:
+def _closed_folder_warnings(folders: Sequence[Path]) -> tuple[DataWarning, ...]:
     """Tell about folders with the recording's name that may not be looked into, such as another user's."""
     faults = []
     for folder in folders:

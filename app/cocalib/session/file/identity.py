@@ -76,7 +76,8 @@ def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: P
     if is_same_recording(kept, facts):
         return
     raise SessionFileError(
-        f"{folder}: the session belongs to {_described(kept)}, but the recording is {_described(recording_form(facts))}; "
+        f"{folder}: the session belongs to {_recording_text(kept)}, but the recording is "
+        f"{_recording_text(recording_form(facts))}; "
         "open the recording and the image topic it was made with, give another --session folder, or start over with --fresh "
         "(a backup is kept)"
     )
@@ -103,7 +104,7 @@ def _digest(times_ns: TimesNs) -> str:
     return hashlib.sha256(times_ns.astype("<i8").tobytes()).hexdigest()
 
 
-def _described(form: RecordingForm) -> str:
+def _recording_text(form: RecordingForm) -> str:
     start = f" from {form.start.sec}.{form.start.nanosec:09d} s" if form.start else ""
     what = f"{form.frames} frames of {form.width_px} x {form.height_px} px"
     if not form.frames and form.scans:

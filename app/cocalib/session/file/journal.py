@@ -221,7 +221,7 @@ class _OpenFile:
         self._folder, self._name, self._length = folder, name, length
         self._descriptor = folder.open(name, os.O_RDWR)
         try:
-            self._cut()
+            self._truncate()
         except OSError:
             self.close()
             raise
@@ -245,7 +245,7 @@ class _OpenFile:
                 os.fsync(self._descriptor)
         except OSError:
             try:
-                self._cut()
+                self._truncate()
             except OSError:
                 self.close()
             raise
@@ -273,7 +273,7 @@ class _OpenFile:
         if descriptor >= 0:
             os.close(descriptor)
 
-    def _cut(self) -> None:
+    def _truncate(self) -> None:
         """Truncate after the last complete line."""
         os.ftruncate(self._descriptor, self._length)
         os.lseek(self._descriptor, self._length, os.SEEK_SET)

@@ -113,30 +113,30 @@ class SessionFile:
     def _verified(self) -> Closed:
         path, clicks = self._folder.path, len(self._present.clicks)
         if not self._folder.is_in_place():
-            return self._rescued(f"{path} was deleted, moved or replaced while it was open")
+            return self._rescue(f"{path} was deleted, moved or replaced while it was open")
         fault, copy_fault = self._journal.fault(), self._journal.copy_fault()
         if not fault:
             return Closed(path, clicks)
         fault = f"{path / JOURNAL}: {fault}"
         if not copy_fault:
             return Closed(path, clicks, fault, path / COPY)
-        return self._rescued(f"{fault}; {COPY}: {copy_fault}")
+        return self._rescue(f"{fault}; {COPY}: {copy_fault}")
 
-    def _rescued(self, fault: str) -> Closed:
+    def _rescue(self, fault: str) -> Closed:
         """Write the session to the user's folder, or to the system's folder for temporary files."""
         path, count = self._folder.path, len(self._present.clicks)
         if not count:
             return Closed(path, 0, fault)
         for home in (user_session_folder(f"{self._name}-rescued").parent, Path(tempfile.gettempdir())):
             try:
-                return Closed(path, count, fault, self._written(home))
+                return Closed(path, count, fault, self._write_copy(home))
             except OSError as error:
                 fault = f"{fault}; {home}: {error.strerror or error}"
             except SessionFileError as error:
                 fault = f"{fault}; {error}"
         return Closed(path, count, fault)
 
-    def _written(self, home: Path) -> Path:
+    def _write_copy(self, home: Path) -> Path:
         number = 1
         plain = "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in self._name)[:100]
         while os.path.lexists(path := home / f"{plain}-rescued-{number}.cocalib-session"):
@@ -171,7 +171,7 @@ def open_session_file(folder: Path, facts: RecordingFacts, warnings: tuple[DataW
             stack.callback(guarded.close)
             lock = FolderLock(guarded)
             stack.callback(lock.close)
-            opened = _opened(guarded, lock, facts, warnings)
+            opened = _open_folder(guarded, lock, facts, warnings)
         except OSError as error:
             raise SessionFileError(
                 f"{folder}: cannot be used: {error.strerror}; give another --session folder"
@@ -206,7 +206,7 @@ def set_aside(folder: Path) -> Path | None:
     return kept
 
 
-def _opened(
+def _open_folder(
     folder: GuardedFolder, lock: FolderLock, facts: RecordingFacts, warnings: tuple[DataWarning, ...]
 ) -> SessionFile:
     contents = read_contents(folder, facts)
@@ -216,7 +216,7 @@ def _opened(
         restored = Restored(folder.path, History(), warnings=warnings)
     else:
         lines = contents.lines
-        about = (*warnings, *_about(contents, facts, folder))
+        about = (*warnings, *_restored_warnings(contents, facts, folder))
         if not contents.is_written:
             rewrite(folder, contents)
         elif contents.faults:
@@ -231,7 +231,7 @@ def _opened(
     return opened
 
 
-def _about(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tuple[DataWarning, ...]:
+def _restored_warnings(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tuple[DataWarning, ...]:
     """Return what the user must know about the session before continuing.
 
     Raises:
@@ -242,13 +242,13 @@ def _about(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tup
             f"{folder.path}: the session is damaged: {'; '.join(found.faults)}; nothing was changed. "
             f"See what can be kept: cocalib session repair {folder.path}"
         )
-    faults = _about_faults(found) if found.faults else ()
+    faults = _fault_warnings(found) if found.faults else ()
     if all(isinstance(step, AxesStated) for step in found.steps):
         return faults
-    return (*faults, *_about_axes(found.radar_axes, facts.radar_axes))
+    return (*faults, *_axes_warnings(found.radar_axes, facts.radar_axes))
 
 
-def _about_faults(found: Contents) -> tuple[DataWarning, ...]:
+def _fault_warnings(found: Contents) -> tuple[DataWarning, ...]:
     clicks = len(found.history.present.clicks)
     message = (
         f"the session was damaged: {'; '.join(found.faults)}; it continues with the {clicks} clicks in the journal and its copy; "
@@ -258,7 +258,7 @@ def _about_faults(found: Contents) -> tuple[DataWarning, ...]:
     return (DataWarning.reported("session-damaged", message, hint),)
 
 
-def _about_axes(before: str | None, now: str | None) -> tuple[DataWarning, ...]:
+def _axes_warnings(before: str | None, now: str | None) -> tuple[DataWarning, ...]:
     """Warn that the radar is read differently from last time; the clicks are pixels and stay valid."""
     if before == now:
         return ()

@@ -132,7 +132,7 @@ class Hub:
         self.proposing.greet(outbox)
         self.boxes.greet(outbox)
         if self.survey is not None:
-            for kind, message in self._found(self.survey):
+            for kind, message in self._survey_messages(self.survey):
                 outbox.put(encode(message), kind=kind)
         else:
             outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
@@ -152,7 +152,7 @@ class Hub:
         """Show what the radar alone says, as far as it is known."""
         before, self.survey = self.survey, survey
         self.workspace.show_placements(survey.placements)
-        for kind, message in self._found(survey):
+        for kind, message in self._survey_messages(survey):
             self.broadcast(message, kind)
         self.proposing.surveyed(survey.placements)
         if before is None:
@@ -189,22 +189,22 @@ class Hub:
         if self.survey is not None:
             self.workspace.show_placements(self.survey.placements)
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
-        for kind, message in self._found(self.survey):
+        for kind, message in self._survey_messages(self.survey):
             self.broadcast(message, kind)
         for tab in self.tabs:
             tab.refresh()
         self.proposing.surveyed(self.survey.placements if self.survey else ())
         if self.workspace.facts.has_images:
             with error_boundary("comparing the images", _log.error):
-                await changes_of(self.recording, self.moments, self.executor, self._compared, self._is_playing)
+                await changes_of(self.recording, self.moments, self.executor, self._compare_images, self._is_playing)
 
-    def _compared(self, changes: ImageChanges) -> None:
+    def _compare_images(self, changes: ImageChanges) -> None:
         self.image_changes = changes
 
     def _is_playing(self) -> bool:
         return any(tab.is_playing for tab in self.tabs)
 
-    def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
+    def _survey_messages(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
         """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without images."""
         if survey is not None and not self.workspace.facts.has_images:
             yield "radar_map", survey.map
@@ -222,7 +222,7 @@ class Hub:
             frame_times=StampColumns.of(facts.moments),
             start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),
-            warnings=tuple(map(warning_row, (*restored.warnings, *_settled(recording)))),
+            warnings=tuple(map(warning_row, (*restored.warnings, *_recording_warnings(recording)))),
             sensors=(
                 _radar_sensor(recording),
                 _sensor("camera", recording.image_topic, recording.topics),
@@ -234,7 +234,7 @@ class Hub:
         )
 
 
-def _settled(recording: Recording) -> list[DataWarning]:
+def _recording_warnings(recording: Recording) -> list[DataWarning]:
     """Return the warnings about a recording, without its assumptions: those are in the view until they are confirmed."""
     return [warning for warning in recording.warnings if warning.code != "assumed"]
 

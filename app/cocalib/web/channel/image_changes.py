@@ -88,11 +88,11 @@ async def changes_of(
                 found[index] = change
         except CalibrationError as error:
             _log.info("frame %d could not be compared with the next one: %s", index, error)
-        tell(_known(found, moments, complete=count == len(order)))
+        tell(_known_changes(found, moments, complete=count == len(order)))
         await asyncio.sleep(max(_LEAST_REST_S, _REST * (time.monotonic() - started)))
 
 
-def _known(found: dict[int, float], moments: TimesNs, *, complete: bool) -> ImageChanges:
+def _known_changes(found: dict[int, float], moments: TimesNs, *, complete: bool) -> ImageChanges:
     frames = sorted(found)
     seconds = tuple(round(int(moments[frame] - moments[0]) / NS_PER_S, 3) for frame in frames)
     return ImageChanges(seconds, tuple(found[frame] for frame in frames), complete)

@@ -59,7 +59,7 @@ class LensService:
         self._workspace = workspace
         self._images = RecordedImages(recording)
         self._tell = tell
-        self._job = LensJob(self._changed)
+        self._job = LensJob(self._note_progress)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_due = False
         self._result: LensResult | None = None
@@ -103,7 +103,7 @@ class LensService:
         lens = self._job.snapshot.lens
         if lens is None:
             raise InputError("there is no calibrated lens to use yet; calibrate it first")
-        step = IntrinsicsChosen(ChosenIntrinsics.of(lens.camera, _about(lens)))
+        step = IntrinsicsChosen(ChosenIntrinsics.of(lens.camera, _lens_source(lens)))
         await asyncio.get_running_loop().run_in_executor(None, partial(self._workspace.dispatch, step))
 
     async def close(self) -> None:
@@ -128,7 +128,7 @@ class LensService:
             raise InputError("there are no intrinsics to save yet; calibrate the lens first")
         return camera_info_text(camera, "camera") + HASH_TAG
 
-    def _changed(self) -> None:
+    def _note_progress(self) -> None:
         """Take note of progress, in the thread of the calibration; the pages are told shortly afterwards."""
         loop = self._loop
         if loop is None or self._is_due:
@@ -151,7 +151,7 @@ class LensService:
             if lens is not None and lens is not self._result_of:
                 self._result_of = lens
                 self._number += 1
-                work = partial(lens_result, self._number, lens, _about(lens))
+                work = partial(lens_result, self._number, lens, _lens_source(lens))
                 self._result = await asyncio.to_thread(work)
                 self._tell(self._result, "lens_result")
             if self._loop is not None:
@@ -181,10 +181,10 @@ class LensService:
 
 
 def _is_in_use(now: LensSnapshot, chosen: ChosenIntrinsics | None) -> bool:
-    return now.lens is not None and chosen == ChosenIntrinsics.of(now.lens.camera, _about(now.lens))
+    return now.lens is not None and chosen == ChosenIntrinsics.of(now.lens.camera, _lens_source(now.lens))
 
 
-def _about(lens: CalibratedLens) -> str:
+def _lens_source(lens: CalibratedLens) -> str:
     """Say where a calibrated lens comes from."""
     return f"the board in this recording ({lens.board.text}, {len(lens.views)} views)"
 

@@ -112,9 +112,9 @@ class ReviewService:
             )
         if isinstance(request, UncertaintyWanted):
             return Uncertainty(session.outcome_revision, contour_maps(calibration) if calibration else ())
-        return self._compared(request)
+        return self._compare_solutions(request)
 
-    def _compared(self, request: CompareWanted) -> Compared:
+    def _compare_solutions(self, request: CompareWanted) -> Compared:
         session = self._workspace.session
         try:
             return compared(
@@ -132,7 +132,7 @@ class ReviewService:
             InputError: there is none, and why.
         """
         if kind in ("reference", "file", "before"):
-            return self._given(kind)
+            return self._existing_solution(kind)
         if kind == "now" or kind == session.options.method:
             if not isinstance(session.outcome, Calibration) or session.outcome.checking:
                 raise InputError("there is no checked calibration yet; this is compared once there is one")
@@ -142,7 +142,7 @@ class ReviewService:
         options = replace(session.options, method="paper" if kind == "paper" else "default")
         return solution_of(_LABELS[kind], self._solved(session, options))
 
-    def _given(self, kind: SolutionKind) -> Solution:
+    def _existing_solution(self, kind: SolutionKind) -> Solution:
         """Return a solution that exists already.
 
         Raises:

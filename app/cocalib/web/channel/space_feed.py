@@ -56,7 +56,7 @@ class SpaceFeed:
             return None
         self._number += 1
         sight = await self._sight(cursor)
-        look = await asyncio.get_running_loop().run_in_executor(self._hub.executor, _drawn, scene, sight)
+        look = await asyncio.get_running_loop().run_in_executor(self._hub.executor, _draw_frame, scene, sight)
         self._drawn_at_s = time.monotonic()
         return look
 
@@ -152,7 +152,7 @@ def surveyed_extent(survey: Survey, returns: Returns) -> Extent:
     return extent_of(points, weights, reflectors)
 
 
-def _drawn(scene: TabScene, sight: Sight) -> SpaceFrame:
+def _draw_frame(scene: TabScene, sight: Sight) -> SpaceFrame:
     scene.show(sight)
     return space_frame(sight)
 

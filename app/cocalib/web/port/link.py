@@ -160,7 +160,7 @@ class HandOver:
             url: the link.
             opener: opens an address in the browser; None for the user's own.
         """
-        self.path = _written(url)
+        self.path = _write_link(url)
         if self.path is not None:
             threading.Thread(target=opener or webbrowser.open, args=(self.path.as_uri(),), daemon=True).start()
 
@@ -175,7 +175,7 @@ class HandOver:
             return  # another server's file is in the folder
 
 
-def _written(url: str) -> Path | None:
+def _write_link(url: str) -> Path | None:
     link = html.escape(url, quote=True)
     page = (
         '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer"><title>cocalib</title>'

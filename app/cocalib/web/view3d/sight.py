@@ -119,8 +119,8 @@ def space_frame(sight: Sight) -> SpaceFrame:
     return SpaceFrame(
         number=sight.number,
         index=sight.index,
-        returns=_seen(sight, sight.returns.thinned(_MOST_RETURNS)),
-        window=_seen(sight, sight.window.thinned(_MOST_IN_WINDOW)),
+        returns=_coloured_returns(sight, sight.returns.thinned(_MOST_RETURNS)),
+        window=_coloured_returns(sight, sight.window.thinned(_MOST_IN_WINDOW)),
         reflectors=tuple(_reflectors(solved, pairs)) if isinstance(solved, Calibration) else (),
         placements=_placements(sight),
         labels=tuple(_labels(sight)),
@@ -139,7 +139,7 @@ def ground_m(sight: Sight) -> float:
     return float(min([0.0, *true_positions(calibration, inliers)[:, 2].tolist()])) if calibration else 0.0
 
 
-def _seen(sight: Sight, returns: Returns) -> tuple[SpaceReturn, ...]:
+def _coloured_returns(sight: Sight, returns: Returns) -> tuple[SpaceReturn, ...]:
     """Return returns with their colours and sizes."""
     colours = ("#{:02x}{:02x}{:02x}".format(*colour) for colour in sight.colouring.of(returns, sight.trail_s))
     sizes = (SIZES[number] for number in size_classes(returns.snr_db, sight.colouring.snr_db))

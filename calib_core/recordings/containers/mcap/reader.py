@@ -9,7 +9,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
-from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource, about_recovery
+from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource, recovery_warning
 from calib_core.recordings.containers.mcap.records import (
     BETWEEN_CHUNKS,
     CHUNK_INDEX,
@@ -79,7 +79,7 @@ class McapSource(ChunkedSource):
             self._scan(closed=closed)
         self._found.clear()
         if self._private_bytes:
-            self.warnings = (*self.warnings, _about_private(self.path, self._private_bytes))
+            self.warnings = (*self.warnings, _private_record_warning(self.path, self._private_bytes))
 
     def _summary_start(self) -> int | None:
         """Return the position of the summary; 0 for a file without one, None for a file that was not closed."""
@@ -234,7 +234,7 @@ class McapSource(ChunkedSource):
             raise self._damaged(len(MAGIC))
         self._note_indexes()
         if not sound:
-            warning = about_recovery(
+            warning = recovery_warning(
                 self.path,
                 messages=count,
                 lost_bytes=mcap.lost_bytes,
@@ -282,7 +282,7 @@ class McapSource(ChunkedSource):
         return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
 
 
-def _about_private(path: Path, count: int) -> DataWarning:
+def _private_record_warning(path: Path, count: int) -> DataWarning:
     return DataWarning.reported(
         "unknown-records",
         f"{path.name} contains {count} bytes in records of kinds that the format leaves to other programs; they are skipped",

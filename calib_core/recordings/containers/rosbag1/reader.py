@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource, about_recovery
+from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource, recovery_warning
 from calib_core.recordings.containers.rosbag1.index import (
     CONNECTION,
     ChunkInfo,
@@ -118,7 +118,7 @@ class Rosbag1Source(ChunkedSource):
             columns = np.array(entries, dtype=np.int64)
             self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
         count = sum(map(len, bag.messages.values()))
-        warning = about_recovery(
+        warning = recovery_warning(
             self.path,
             messages=count,
             lost_bytes=bag.lost_bytes,

@@ -122,7 +122,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         cloud_channel(topic),
         stamps,
         _message(stamps, edges, points),
-        (*([_counted(path)] if times.counted else ()), *([_cut_off(path)] if rows.is_cut_off else ())),
+        (*([_count_warning(path)] if times.counted else ()), *([_cut_off(path)] if rows.is_cut_off else ())),
         assumptions=(*times.assumptions, *_assumptions(columns, topic)),
         zoneless=times.zoneless,
         counted=times.counted,
@@ -270,7 +270,9 @@ def _spelt(path: Path, names: Sequence[str], one: MappedColumn) -> str:
             return names[known.index(wanted)]
     near = get_close_matches(one.column, bare, 1, 0.0)
     hint = f"; did you mean '{near[0]}'? " if near else "; "
-    raise RecordingError(f"{path}: --map {one.words}: no column '{one.column}'{hint}The columns are {_listed(bare)}")
+    raise RecordingError(
+        f"{path}: --map {one.words}: no column '{one.column}'{hint}The columns are {_column_list(bare)}"
+    )
 
 
 def _plan(
@@ -309,12 +311,12 @@ def _plan(
     if plan is None:
         raise RecordingError(
             f"{path}: no position columns; x_m and y_m, or range_m and azimuth_deg, are required, such as {TABLE_EXAMPLE}; "
-            f"the columns are {_listed(names)}: say which is which with --map x=NAME:m --map y=NAME:m"
+            f"the columns are {_column_list(names)}: say which is which with --map x=NAME:m --map y=NAME:m"
         )
     return plan
 
 
-def _listed(names: Sequence[str]) -> str:
+def _column_list(names: Sequence[str]) -> str:
     shown = ", ".join(names[:12])
     return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"
 
@@ -381,7 +383,7 @@ def _stamped_inside(files: Sequence[Path], times: TimeReader, options: PlainOpti
     return StampedFiles(tuple(ordered), times_ns, zoneless=times.zoneless)
 
 
-def _counted(path: Path) -> DataWarning:
+def _count_warning(path: Path) -> DataWarning:
     return DataWarning.reported(
         "numbered-files",
         f"{path.name}: the scans are numbered and have no times; an interval of 0.1 s is assumed",

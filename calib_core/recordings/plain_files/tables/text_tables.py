@@ -74,7 +74,7 @@ class TextTable:
             RecordingError: the file cannot be read as text.
         """
         try:
-            with TextIOWrapper(_opened(self.path, self.content), self.encoding, newline="") as file:
+            with TextIOWrapper(_open_text(self.path, self.content), self.encoding, newline="") as file:
                 for _ in range(self.skipped_lines):
                     file.readline(_HEAD_BYTES)
                 yield _reader(file, self.separator)
@@ -101,7 +101,7 @@ def _reader(file: TextIO, separator: str) -> Iterator[list[str]]:
     return csv.reader(file, delimiter=separator, skipinitialspace=separator == " ")
 
 
-def _opened(path: Path, content: bytes | None) -> BinaryIO:
+def _open_text(path: Path, content: bytes | None) -> BinaryIO:
     return path.open("rb") if content is None else BytesIO(content)
 
 
@@ -116,7 +116,7 @@ def open_text_table(path: Path, content: bytes | None = None) -> TextTable:
         RecordingError: it is empty, or cannot be read.
     """
     try:
-        with _opened(path, content) as file:
+        with _open_text(path, content) as file:
             head = file.read(_HEAD_BYTES)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
@@ -298,7 +298,7 @@ def _read_numbers(
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
             if _is_end(table, rows):
                 return _rows(stamps, values, len(places), is_cut_off=True)
-            raise _damaged(table, number, error) from error
+            raise _damage_error(table, number, error) from error
         stamps.append(time)
         values.extend(numbers)
     return _rows(stamps, values, len(places))
@@ -313,7 +313,7 @@ def _is_end(table: TextTable, rows: Iterator[list[str]]) -> bool:
     """Return whether no row follows and the file does not end with a line feed: its writer was stopped within a row."""
     if next(rows, None) is not None:
         return False
-    with _opened(table.path, table.content) as file:
+    with _open_text(table.path, table.content) as file:
         file.seek(-2, SEEK_END)
         return b"\n" not in file.read()
 
@@ -322,7 +322,7 @@ def _no_time(_: Sequence[str]) -> object:
     return None
 
 
-def _damaged(table: TextTable, number: int, error: Exception) -> RecordingError:
+def _damage_error(table: TextTable, number: int, error: Exception) -> RecordingError:
     why = "too few columns" if isinstance(error, IndexError) else str(error)
     return RecordingError(f"{table.path}: line {number}: {why}; fix or remove the line")
 
@@ -349,7 +349,7 @@ def _read_lists(
     for number, split in enumerate(rows, start=table.skipped_lines + 1):
         if not _is_data(split):
             continue
-        row = _joined(split, table.separator) if len(split) > len(table.names) else split
+        row = _join_cells(split, table.separator) if len(split) > len(table.names) else split
         try:
             lists = [_list(text) for text in cells(row)]
             count = max(map(len, lists))
@@ -359,14 +359,14 @@ def _read_lists(
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
             if _is_end(table, rows):
                 return _rows(stamps, values, len(places), is_cut_off=True)
-            raise _damaged(table, number, error) from error
+            raise _damage_error(table, number, error) from error
         full = [one * count if len(one) == 1 else one for one in lists]
         stamps.extend([time] * count)
         values.extend(value for one in zip(*full, strict=True) for value in one)
     return _rows(stamps, values, len(places))
 
 
-def _joined(row: Sequence[str], separator: str) -> list[str]:
+def _join_cells(row: Sequence[str], separator: str) -> list[str]:
     """Join the cells of lists that are separated like the columns and not quoted."""
     joined: list[str] = []
     depth = 0

@@ -67,7 +67,7 @@ class ArrayLayout:
         Raises:
             MessageError: the bytes do not fit the definition.
         """
-        message = _within(decode(self.definition, payload), self.scope)
+        message = _message_within(decode(self.definition, payload), self.scope)
         count = message.whole(self.count_field) if self.count_field else None
         if count == 0 or not message.count(self.plan.position[0]):
             return no_returns()
@@ -86,7 +86,7 @@ class ArrayLayout:
         return replace(self, definition=definition) if fits else None
 
 
-def _within(message: Message, path: Sequence[str]) -> Message:
+def _message_within(message: Message, path: Sequence[str]) -> Message:
     for name in path:
         message = message.message(name)
     return message
@@ -107,8 +107,8 @@ def _arrays_in(samples: Samples, path: tuple[str, ...], kind: str, stated: State
     named = [DescribedColumn(field.name, False, "", np.zeros(0)) for field in fields]
     if not stated.column_map and plan_described("arrays", named) is None:
         return None
-    messages = [_within(message, path) for message in samples.messages]
-    for names in _alike([(field.name, field.count or 0) for field in fields], messages):
+    messages = [_message_within(message, path) for message in samples.messages]
+    for names in _equal_length_groups([(field.name, field.count or 0) for field in fields], messages):
         within = stated.within(".".join(path), names)
         if within is None:
             continue
@@ -119,7 +119,7 @@ def _arrays_in(samples: Samples, path: tuple[str, ...], kind: str, stated: State
                 field.name,
                 PRIMITIVES[field.type][0] != "f",
                 field.comment,
-                np.concatenate([_used(message, field.name, counter) for message in messages]),
+                np.concatenate([_used_values(message, field.name, counter) for message in messages]),
             )
             for field in fields
             if field.name in names
@@ -132,7 +132,7 @@ def _arrays_in(samples: Samples, path: tuple[str, ...], kind: str, stated: State
     return None
 
 
-def _alike(arrays: Sequence[tuple[str, int]], messages: Sequence[Message]) -> list[list[str]]:
+def _equal_length_groups(arrays: Sequence[tuple[str, int]], messages: Sequence[Message]) -> list[list[str]]:
     """Group arrays that have equal lengths in all messages, the largest group first."""
     groups: dict[tuple[int, ...], list[str]] = {}
     for name, fixed in arrays:
@@ -142,7 +142,7 @@ def _alike(arrays: Sequence[tuple[str, int]], messages: Sequence[Message]) -> li
     return sorted((group for group in groups.values() if len(group) > 1), key=len, reverse=True)
 
 
-def _used(message: Message, name: str, counter: str | None) -> np.ndarray:
+def _used_values(message: Message, name: str, counter: str | None) -> np.ndarray:
     return message.numbers(name, message.count(name))[: message.whole(counter) if counter else None]
 
 
@@ -379,7 +379,7 @@ def _list_at(
         else ListLayout(
             definition,
             place,
-            _about_place(plan, place, parents, counter, len(samples.messages) if parents and samples else 0),
+            _with_place_assumption(plan, place, parents, counter, len(samples.messages) if parents and samples else 0),
             counter,
         )
     )
@@ -399,7 +399,7 @@ def _sampled(parents: Sequence[Message], last: str, name: str, counter: str | No
     return np.concatenate(columns) if columns else np.zeros(0)
 
 
-def _about_place(
+def _with_place_assumption(
     plan: ColumnPlan, place: ListPlace, parents: Sequence[Message], counter: str | None, messages: int
 ) -> ColumnPlan:
     """Add to a plan what its list's place in the message leaves open.

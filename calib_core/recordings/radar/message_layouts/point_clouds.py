@@ -102,7 +102,7 @@ class CloudLayout:
         points = _points(data, dtype, height, width, step)
         dense = np.array([not (self.definition.names & {"is_dense"}) or bool(message.whole("is_dense"))])
         returns = _unless_marked(_returns(points, plan), dense, np.array([len(points)]))
-        beyond = _beyond(data, dtype, width) if height == 1 else 0
+        beyond = _points_beyond_width(data, dtype, width) if height == 1 else 0
         if beyond:
             return _with_lost(returns, beyond)
         if height == 1 and order == "<":
@@ -283,7 +283,7 @@ def _unless_marked(returns: Returns, dense: np.ndarray, counts: np.ndarray) -> R
     return replace(returns, lost=returns.lost & ~marked[cloud])
 
 
-def _beyond(data: np.ndarray, dtype: np.dtype[Any], width: int) -> int:
+def _points_beyond_width(data: np.ndarray, dtype: np.dtype[Any], width: int) -> int:
     """Return how many points lie in the data beyond the width that the message states, up to the last that is not all zero."""
     rest = data[width * dtype.itemsize :]
     filled = np.flatnonzero(rest[: len(rest) // dtype.itemsize * dtype.itemsize])

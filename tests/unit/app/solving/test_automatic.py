@@ -18,7 +18,7 @@ from calib_core.proposing import ImageCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import UnconfirmedClicks
 from calib_core.results.actions import MeasureCameraPosition
-from calib_core.words.outcomes import outcome_told
+from calib_core.words.outcomes import outcome_remark
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))
@@ -78,4 +78,4 @@ def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(away_m, measur
     assert isinstance(outcome, Unsolvable) is is_refused
     if isinstance(outcome, Unsolvable):
         assert outcome.code == "not-confident"
-        assert outcome_told(outcome).action == MeasureCameraPosition()
+        assert outcome_remark(outcome).action == MeasureCameraPosition()

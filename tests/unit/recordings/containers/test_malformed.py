@@ -11,7 +11,7 @@ import pytest
 
 from calib_core.errors import RecordingError
 from calib_core.recordings import describe, first_image, inspect_recording
-from calib_core.words.warnings import told
+from calib_core.words.warnings import warning_remark
 from tests.unit.recordings.containers.malformed import CASES, FRAMES, Kit
 
 LOSSLESS = {
@@ -50,7 +50,7 @@ def test_complete_messages_are_recovered_losses_are_reported_and_a_first_image_i
         with inspect_recording(path) as recording:
             scans = len(recording.radar_scans())
             images = sum(_image(recording, index) == jpeg for index in range(len(recording.image_times)))
-            said = [f"{warning.code}: {told(warning).message}" for warning in recording.warnings]
+            said = [f"{warning.code}: {warning_remark(warning).message}" for warning in recording.warnings]
             said += [t.problem for t in recording.topics if t.problem and t.problem != "no messages"]
     except RecordingError as error:
         said = [str(error)]

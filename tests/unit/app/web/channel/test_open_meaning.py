@@ -12,7 +12,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.recordings import Recording
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.opening.choice import MeaningPick
-from cocalib.opening.opened import GivenCalibration, about_calibration
+from cocalib.opening.opened import GivenCalibration, calibration_warnings
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 
 POSE = RigidTransform(np.eye(3), [0.4, 0.1, -0.2])
@@ -83,7 +83,7 @@ def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file, 
     pick = MeaningPick("radar_from_camera,body,rfu,m", "front.T")
     shown = GivenCalibration.read(file).shown(camera, pick)
     assert [row.meaning for row in meaning_rows(shown.meaning).rows if row.is_shown] == [pick.meaning]
-    (warning,) = about_calibration(file.name, shown)
+    (warning,) = calibration_warnings(file.name, shown)
     assert warning.code == "calibration-picked"
     assert warning.facts["message"].startswith("extrinsic.json ")
 
@@ -95,6 +95,6 @@ def test_a_format_that_leaves_something_open_is_shown_with_what_was_assumed(tmp_
     path.write_text("P2: 700 0 320 0 0 700 240 0 0 0 1 0\nR0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: " + rows + "\n")
     shown = GivenCalibration.read(path).shown(camera)
     assert shown.meaning is None
-    (warning,) = about_calibration(path.name, shown)
+    (warning,) = calibration_warnings(path.name, shown)
     assert warning.code == "calibration-assumed"
     assert warning.facts["message"].startswith("calib.txt ")
