@@ -144,11 +144,15 @@ def contact_sheet(frame: FrameWithReturns, hypotheses: Sequence["Hypothesis"]) -
     return np.vstack([np.hstack(row) for row in rows])
 
 
-def _caption(frame: FrameWithReturns, number: int, one: "Hypothesis") -> np.ndarray:
+def _caption(frame: FrameWithReturns, number: int, hypothesis: "Hypothesis") -> np.ndarray:
     import cv2
 
     strip = np.full((_CAPTION_PX, _TILE_WIDTH_PX, 3), _PAPER, np.uint8)
-    lines = (f"{number}: {one.key}", f"{one.score}; {returns_in_image(frame, one)}", one.mounting)
+    lines = (
+        f"{number}: {hypothesis.key}",
+        f"{hypothesis.score}; {returns_in_image(frame, hypothesis)}",
+        hypothesis.mounting,
+    )
     for row, line in enumerate(lines):
         at = 6, 15 + row * _LINE_PX
         cv2.putText(strip, line[:100], at, cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _INK, 1, cv2.LINE_AA)

@@ -148,17 +148,17 @@ class Panels:
         width, height = self.video_size_px
         frame = np.zeros((height, width, 3), np.uint8)
         rows, columns = image.shape[:2]
-        for place, (calibration, seen, strip) in enumerate(
+        for index, (calibration, seen, strip) in enumerate(
             zip(self._calibrations, self._seen, self._strips, strict=True)
         ):
-            own = slice(place * columns, (place + 1) * columns)
+            own = slice(index * columns, (index + 1) * columns)
             panel = np.ascontiguousarray(image)
-            if place + 1 < len(self._calibrations):
+            if index + 1 < len(self._calibrations):
                 panel = panel.copy()
             self._draw(panel, calibration, seen, time)
             frame[:rows, own] = panel
             below = strip.copy()
-            if place == 0:
+            if index == 0:
                 _write_changing(below, self._words(time))
             frame[rows:, own] = below
         return frame
@@ -431,11 +431,11 @@ def _images(
     recording, total = view.recording, len(view.recording.image_times)
     for block in frame_blocks(recording, trail_s=_LONGEST_SCAN_S * options.trail_scans):
         panels.enter(block)
-        for place, time in enumerate(block.times_ns.tolist()):
+        for index, time in enumerate(block.times_ns.tolist()):
             if progress:
-                progress(block.first + place, total)
+                progress(block.first + index, total)
             try:
-                image = recording.image(block.first + place)
+                image = recording.image(block.first + index)
             except MessageError as error:
                 skipped.add_unreadable(error)
                 continue

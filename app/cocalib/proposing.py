@@ -466,6 +466,6 @@ class ProposingJob:
         self._changed()
 
 
-def _same_images(one: ProposingWish, other: ProposingWish) -> bool:
+def _same_images(wish: ProposingWish, other: ProposingWish) -> bool:
     """Return whether two wishes need the same placements looked at with the same camera."""
-    return one.camera is other.camera and one.placements is other.placements
+    return wish.camera is other.camera and wish.placements is other.placements

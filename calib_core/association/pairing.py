@@ -103,7 +103,7 @@ def pair_clicks(
     untouched = {click.id for click in clicks if click.mark == "untouched"}
     pairs = [*pairing.pairs, *(pair for pair in every.pairs if pair.id in untouched)]
     unpaired = [*pairing.unpaired, *(one for one in every.unpaired if one.id in untouched)]
-    rank = {click.id: place for place, click in enumerate(sorted(clicks))}
+    rank = {click.id: index for index, click in enumerate(sorted(clicks))}
     return Pairing(
         tuple(sorted(pairs, key=lambda pair: rank[pair.id])), tuple(sorted(unpaired, key=lambda one: rank[one.id]))
     )
@@ -129,7 +129,7 @@ def _pairing(
     if shared is not windows:
         pairs, empty = _paired(reachable, shared, static, elsewhere, options)
     unpaired += [_without_return(click, window, options) for click, window in empty]
-    rank = {click.id: place for place, click in enumerate(sorted(clicks))}
+    rank = {click.id: index for index, click in enumerate(sorted(clicks))}
     return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
 
 

@@ -177,21 +177,21 @@ def _heaviest_first(dwells: Sequence[Dwell]) -> list[Dwell]:
     return sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end))
 
 
-def _overlap_s(one: Dwell, other: Dwell) -> float:
-    return (min(one.end, other.end) - max(one.start, other.start)) / NS_PER_S
+def _overlap_s(dwell: Dwell, other: Dwell) -> float:
+    return (min(dwell.end, other.end) - max(dwell.start, other.start)) / NS_PER_S
 
 
-def _belong_together(one: Dwell, other: Dwell) -> bool:
+def _belong_together(dwell: Dwell, other: Dwell) -> bool:
     """Return whether two simultaneous dwells are one return, or come and go together as far as the scans show."""
     together = [
         abs(first - second) < _SAME_MOMENT_S * NS_PER_S
         for first, second, shown in (
-            (one.start, other.start, one.begins or other.begins),
-            (one.end, other.end, one.ends or other.ends),
+            (dwell.start, other.start, dwell.begins or other.begins),
+            (dwell.end, other.end, dwell.ends or other.ends),
         )
         if shown
     ]
-    one_return = _is_near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
+    one_return = _is_near(dwell, other, _SAME_RETURN) or dwell.is_alternative_of(other)
     return one_return or (bool(together) and all(together))
 
 
@@ -205,9 +205,9 @@ def _is_second_echo(dwell: Dwell, dwells: Sequence[Dwell]) -> bool:
     )
 
 
-def _is_near(one: Dwell, other: Dwell, reaches: float) -> bool:
-    apart = direction_cosines(one.position_radar_m) - direction_cosines(other.position_radar_m)
-    return bool((np.abs(apart) <= reaches * one.reach).all())
+def _is_near(dwell: Dwell, other: Dwell, reaches: float) -> bool:
+    apart = direction_cosines(dwell.position_radar_m) - direction_cosines(other.position_radar_m)
+    return bool((np.abs(apart) <= reaches * dwell.reach).all())
 
 
 def _without_breaks(dwells: Sequence[Dwell]) -> list[Dwell]:

@@ -299,14 +299,14 @@ def tracked(frames: Sequence[Sequence[Box]], first: int = 1) -> list[tuple[Box, 
     return named
 
 
-def _overlap(one: Box, other: Box) -> float:
+def _overlap(box: Box, other: Box) -> float:
     """Return the intersection of two boxes over their union."""
-    across = min(one.right_px, other.right_px) - max(one.left_px, other.left_px)
-    down = min(one.bottom_px, other.bottom_px) - max(one.top_px, other.top_px)
+    across = min(box.right_px, other.right_px) - max(box.left_px, other.left_px)
+    down = min(box.bottom_px, other.bottom_px) - max(box.top_px, other.top_px)
     if across <= 0 or down <= 0:
         return 0.0
     shared = across * down
-    return shared / (_area(one) + _area(other) - shared)
+    return shared / (_area(box) + _area(other) - shared)
 
 
 def _area(box: Box) -> float:

@@ -209,7 +209,7 @@ _OTHER = "is it of another recording?"
 
 
 def matched_boxes(
-    found: FileBoxes,
+    boxes: FileBoxes,
     source: str,
     *,
     image_times: TimesNs,
@@ -219,7 +219,7 @@ def matched_boxes(
     """Give the frames of a file the stamps of recorded frames.
 
     Args:
-        found: the file's content.
+        boxes: the file's content.
         source: its name, for messages.
         image_times: (m,) stamps of the recorded frames, ascending.
         image_size_px: width and height of the recorded images; None if unknown.
@@ -232,19 +232,19 @@ def matched_boxes(
         raise InputError(
             f"{source}: the recording has no camera frames that boxes could belong to; add the camera's file"
         )
-    if not found.frames:
+    if not boxes.frames:
         raise InputError(f"{source}: has no annotated frame; export it again with its frames")
-    _refuse_other_images(found, source, image_size_px)
-    by_name = _by_name(found.frames, image_names)
-    stamps = _stamps_of(found.frames) if by_name is None else None
+    _refuse_other_images(boxes, source, image_size_px)
+    by_name = _by_name(boxes.frames, image_names)
+    stamps = _stamps_of(boxes.frames) if by_name is None else None
     if by_name is not None:
         places, notes = by_name
     elif stamps is not None:
         places, notes = frames_of_stamps(stamps, source, image_times)
     else:
-        places, notes = _by_number(found, source, len(image_times))
-    frames = joined_frames([frame.boxes for frame in found.frames], places, image_times)
-    return Boxes(frames, source, image_size_px or found.image_size_px, (*found.notes, *notes))
+        places, notes = _by_number(boxes, source, len(image_times))
+    frames = joined_frames([frame.boxes for frame in boxes.frames], places, image_times)
+    return Boxes(frames, source, image_size_px or boxes.image_size_px, (*boxes.notes, *notes))
 
 
 def _refuse_other_images(found: FileBoxes, source: str, image_size_px: tuple[int, int] | None) -> None:
@@ -278,7 +278,7 @@ def _touches(box: Box, width_px: int, height_px: int) -> bool:
 
 def _by_name(frames: Sequence[FileFrame], image_names: Sequence[str]) -> tuple[Indices, tuple[str, ...]] | None:
     """Return the recorded frame of each frame by the name of its image, -1 for none, and notes; None if no name is equal."""
-    place_of = {name: place for place, name in enumerate(image_names)}
+    place_of = {name: index for index, name in enumerate(image_names)}
     places = np.array([place_of.get(frame.name, -1) for frame in frames], dtype=np.int64)
     matched = int(np.count_nonzero(places >= 0))
     if not matched:
@@ -297,18 +297,18 @@ def _stamps_of(frames: Sequence[FileFrame]) -> TimesNs | None:
     return named.times_ns if named is not None and len(named.places) == len(names) else None
 
 
-def _by_number(found: FileBoxes, source: str, count: int) -> tuple[Indices, tuple[str, ...]]:
+def _by_number(boxes: FileBoxes, source: str, count: int) -> tuple[Indices, tuple[str, ...]]:
     """Return the recorded frame of each frame by its number, and what was assumed.
 
     Raises:
         InputError: frames have no number, or the numbers do not fit the recorded frames.
     """
-    numbers = _numbers_of(found.frames, source)
-    if found.frame_count is not None and found.frame_count != count:
+    numbers = _numbers_of(boxes.frames, source)
+    if boxes.frame_count is not None and boxes.frame_count != count:
         raise InputError(
-            f"{source}: is for a sequence of {found.frame_count} frames, the recording has {count}; {_OTHER}"
+            f"{source}: is for a sequence of {boxes.frame_count} frames, the recording has {count}; {_OTHER}"
         )
-    first, why = _first_number(found, numbers, count)
+    first, why = _first_number(boxes, numbers, count)
     places = numbers - first
     if places.min() < 0 or places.max() >= count:
         raise InputError(
@@ -350,11 +350,11 @@ def _counting_group(groups: Sequence[Sequence[str]]) -> int:
     return -1
 
 
-def _first_number(found: FileBoxes, numbers: Indices, count: int) -> tuple[int, str]:
+def _first_number(boxes: FileBoxes, numbers: Indices, count: int) -> tuple[int, str]:
     """Return the number of the sequence's first frame, and how it is known."""
     lowest, highest = int(numbers.min()), int(numbers.max())
-    if found.first_number is not None:
-        return found.first_number, "as the format defines"
+    if boxes.first_number is not None:
+        return boxes.first_number, "as the format defines"
     if len(np.unique(numbers)) == count and highest - lowest == count - 1:
         return lowest, "there are as many as recorded frames"
     if lowest == 0:

@@ -68,19 +68,19 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     return (*suspected, *_counted_up(warnings, fit.inliers))
 
 
-def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
+def _counted_up(warnings: list[DataWarning], inliers: Flags) -> list[DataWarning]:
     """With few pairs, say how many there are instead of what only more of them can tell."""
     count = int(inliers.sum())
     if count >= _FEW_INLIERS:
-        return found
+        return warnings
     if len(inliers) >= max(_FEW_INLIERS, 2 * count):
         return [
             DataWarning("no-consensus", {"agreeing": count, "pairs": len(inliers)}),
-            *found,
+            *warnings,
         ]
-    clear = bool(inliers.all()) and not any(one.code in _UNCLEAR for one in found)
+    clear = bool(inliers.all()) and not any(warning.code in _UNCLEAR for warning in warnings)
     few = DataWarning("few-pairs", {"agreeing": count, "pairs": len(inliers), "needed": _FEW_INLIERS, "clear": clear})
-    return [*(one for one in found if one.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
+    return [*(warning for warning in warnings if warning.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
 
 
 def _other_poses(fit: SolvedFit) -> list[DataWarning]:

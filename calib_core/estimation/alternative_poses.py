@@ -377,7 +377,7 @@ def find_alternatives(
     if clear or measurements.prior.measured or measurements.flat or len(measurements) > _MOST_PAIRS:
         return beyond
     alone = np.linalg.inv(uncertainty.information[:6, :6])
-    poses = [one.camera_from_radar for one in others]
+    poses = [solution.camera_from_radar for solution in others]
     drawn = sample_posterior(corrected, refined, alone, poses, rng=rng)
     shared = _positive(uncertainty.covariance - alone)
     summary = summarize_posterior(

@@ -145,9 +145,9 @@ def _found(measurements: PairMeasurements, options: CalibrationOptions, *, most:
     return solve_gnc(few, (*starts, *initial_poses(free, most=_STARTS_FREE, rng=rng)), estimate_scale=estimate_scale)
 
 
-def _mostly_agreeing(measurements: PairMeasurements, found: GncSolution) -> bool:
+def _mostly_agreeing(measurements: PairMeasurements, solution: GncSolution) -> bool:
     """Return whether most pairs are as near as the assumed noise lets them be."""
-    return bool(np.median(associate(measurements, found.camera_from_radar)[1].squared) < RADII[-1] ** 2)
+    return bool(np.median(associate(measurements, solution.camera_from_radar)[1].squared) < RADII[-1] ** 2)
 
 
 def quick_fit(

@@ -269,11 +269,13 @@ def _sums(variance: Values) -> tuple[float, float]:
     return float(variance[:3].sum()), float(variance[3:].sum())
 
 
-def _shares(found: Sequence[SystematicErrorResult], pose: Matrix66) -> tuple[SystematicErrorResult, ...]:
+def _shares(results: Sequence[SystematicErrorResult], pose: Matrix66) -> tuple[SystematicErrorResult, ...]:
     position, rotation = float(np.trace(pose[:3, :3])), float(np.trace(pose[3:, 3:]))
     return tuple(
-        replace(one, position_share=one.position_share / position, rotation_share=one.rotation_share / rotation)
-        for one in found
+        replace(
+            result, position_share=result.position_share / position, rotation_share=result.rotation_share / rotation
+        )
+        for result in results
     )
 
 

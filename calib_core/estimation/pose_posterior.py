@@ -68,7 +68,8 @@ def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
 def joined_poses(several: Sequence[Poses]) -> Poses:
     """Concatenate batches of poses."""
     return Poses(
-        np.concatenate([one.rotations for one in several]), np.concatenate([one.translations_m for one in several])
+        np.concatenate([poses.rotations for poses in several]),
+        np.concatenate([poses.translations_m for poses in several]),
     )
 
 

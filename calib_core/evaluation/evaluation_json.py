@@ -95,8 +95,14 @@ def _held_out(figures: HeldOut | None) -> dict[str, Any] | None:
 
 def _bins(bins: Sequence[Spread]) -> list[dict[str, Any]]:
     return [
-        {"low": one.low, "high": one.high, "n": one.n, "mean_px": one.mean_px, "median_px": one.median_px}
-        for one in bins
+        {
+            "low": spread.low,
+            "high": spread.high,
+            "n": spread.n,
+            "mean_px": spread.mean_px,
+            "median_px": spread.median_px,
+        }
+        for spread in bins
     ]
 
 

@@ -132,10 +132,10 @@ def residual_figures(
     )
 
 
-def _pairs_under(found: AssociatedPairs, calibration: Calibration) -> tuple[tuple[Pair, ...], np.ndarray]:
+def _pairs_under(pairs: AssociatedPairs, calibration: Calibration) -> tuple[tuple[Pair, ...], np.ndarray]:
     """Return the pairs with one candidate each, and its positions (n, 3); of several, the one reprojected nearest."""
     single = []
-    for pair in found.pairs:
+    for pair in pairs.pairs:
         positions = np.array([candidate.position_radar_m for candidate in pair.candidates])
         away_px = np.linalg.norm(calibration.reproject(positions) - pair.pixel_px, axis=1)
         nearest = int(np.argmin(np.where(np.isfinite(away_px), away_px, np.inf)))
@@ -153,29 +153,29 @@ def _explained(pairs: Sequence[Pair], calibration: Calibration) -> np.ndarray:
 
 
 def _both_held_out(
-    found: AssociatedPairs, calibration: Calibration, progress: Callable[[int, int], None] | None
+    pairs: AssociatedPairs, calibration: Calibration, progress: Callable[[int, int], None] | None
 ) -> tuple[HeldOut | None, HeldOut | None]:
     """Leave out one placement at a time, as a solve does, and a fifth of them at a time."""
-    count = int(found.placements.max(initial=-1)) + 1
+    count = int(pairs.placements.max(initial=-1)) + 1
     if count <= MIN_PAIRS:
         return None, None
     folds = min(_FOLDS, count)
-    one = _left_out(found, calibration, count)
+    one = _left_out(pairs, calibration, count)
     told = None if progress is None else lambda done: progress(1 + done, 1 + folds)
-    return one, held_out(found, calibration.camera, calibration.options, found.placements % folds, told)
+    return one, held_out(pairs, calibration.camera, calibration.options, pairs.placements % folds, told)
 
 
-def _left_out(found: AssociatedPairs, calibration: Calibration, count: int) -> HeldOut:
+def _left_out(pairs: AssociatedPairs, calibration: Calibration, count: int) -> HeldOut:
     """Return what a solve of these clicks says of leaving out each placement: its held-out AED is over those that agree."""
-    own = calibrate_pairs(found.every, calibration.camera, replace(calibration.options, method="default"))
+    own = calibrate_pairs(pairs.every, calibration.camera, replace(calibration.options, method="default"))
     if not isinstance(own, Calibration):
-        return HeldOut(count, np.full(len(found.pairs), np.nan), float("nan"))
+        return HeldOut(count, np.full(len(pairs.pairs), np.nan), float("nan"))
     held_out_px = {pair.id: pair.held_out_px for pair in own.pairs}
-    return HeldOut(count, np.array([held_out_px[pair.id] for pair in found.pairs]), own.metrics.held_out_aed_px)
+    return HeldOut(count, np.array([held_out_px[pair.id] for pair in pairs.pairs]), own.metrics.held_out_aed_px)
 
 
 def held_out(
-    found: AssociatedPairs,
+    pairs: AssociatedPairs,
     camera: Camera,
     options: CalibrationOptions,
     groups: Indices,
@@ -184,21 +184,21 @@ def held_out(
     """Predict the clicks of each group from a solve of the others.
 
     Args:
-        found: the clicks with their returns.
+        pairs: the clicks with their returns.
         camera: the lens.
         options: of the solve.
         groups: (n,) numbers from 0; a placement is never divided.
         progress: called with the groups done.
     """
     options = replace(options, method="default")
-    distances_px = np.full(len(found.pairs), np.nan)
+    distances_px = np.full(len(pairs.pairs), np.nan)
     folds = int(groups.max(initial=-1)) + 1
     for fold in range(folds):
-        rest = [pair for pair, group in zip(found.every, groups.tolist(), strict=True) if group != fold]
+        rest = [pair for pair, group in zip(pairs.every, groups.tolist(), strict=True) if group != fold]
         solved = preview_pairs(rest, camera, options)
         if isinstance(solved, Calibration):
             for row in np.flatnonzero(groups == fold).tolist():
-                distances_px[row] = _distance_px(found.pairs[row], solved)
+                distances_px[row] = _distance_px(pairs.pairs[row], solved)
         if progress is not None:
             progress(fold + 1)
     return HeldOut(folds, distances_px, aed(distances_px[np.isfinite(distances_px)]))
@@ -292,8 +292,8 @@ def _tested(
     kept = np.flatnonzero(squared <= _MISFIT)
     rows = jacobian[kept].reshape(-1, 6)
     together_px2 = rows @ covariance @ rows.T
-    for place, pair in enumerate(kept):
-        block = slice(2 * place, 2 * place + 2)
+    for index, pair in enumerate(kept):
+        block = slice(2 * index, 2 * index + 2)
         together_px2[block, block] += noise_px2[pair]
     residual_px = residuals_px[kept].ravel()
     chi2 = float(residual_px @ np.linalg.solve(together_px2, residual_px)) if len(kept) else float("nan")

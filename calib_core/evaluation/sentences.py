@@ -135,13 +135,13 @@ def _held_out_text(figures: HeldOut) -> str:
     return f"AED {_px(figures.aed_px)}{unsolved}"
 
 
-def _bin(one: Spread) -> str:
-    value = f"{one.mean_px:.3g}" if one.n else "-"
-    return f"{one.low:g} to {one.high:g}: {value} ({one.n})"
+def _bin(spread: Spread) -> str:
+    value = f"{spread.mean_px:.3g}" if spread.n else "-"
+    return f"{spread.low:g} to {spread.high:g}: {value} ({spread.n})"
 
 
-def _share(one: Share) -> str:
-    return f"{one.low_m:g} to {one.high_m:g}: {_percent(one.inside / one.returns)} ({one.returns})"
+def _share(share: Share) -> str:
+    return f"{share.low_m:g} to {share.high_m:g}: {_percent(share.inside / share.returns)} ({share.returns})"
 
 
 def _px(value: float) -> str:

@@ -193,13 +193,13 @@ def _read(content: str | bytes, source: str, frames: WantedFrames, beside: Mappi
     raise _refusal(seen[-1], source)
 
 
-def _renamed(found: ImportedCalibration, wanted: WantedFrames) -> ImportedCalibration:
+def _renamed(imported: ImportedCalibration, wanted: WantedFrames) -> ImportedCalibration:
     """Call the frames of a file that is no tree as the user says."""
     if not wanted.is_given:
-        return found
-    known = found.frames or FrameNames()
+        return imported
+    known = imported.frames or FrameNames()
     frames = FrameNames(wanted.radar or known.radar, wanted.camera or known.camera)
-    return replace(found, frames=frames, file=replace(found.file, frames=frames) if found.file else None)
+    return replace(imported, frames=frames, file=replace(imported.file, frames=frames) if imported.file else None)
 
 
 def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibration:
@@ -250,7 +250,7 @@ class Adoption:
 
 
 def _check_found(
-    found: ImportedCalibration,
+    imported: ImportedCalibration,
     source: str,
     *,
     camera: Camera | None = None,
@@ -260,7 +260,7 @@ def _check_found(
     """Check what a reader found before it is converted.
 
     Args:
-        found: what `read_any` returned.
+        imported: what `read_any` returned.
         source: the file's name, for error messages.
         camera: the intrinsics, if the file has none.
         against: a calibration of the same sensors that is known to be right.
@@ -269,44 +269,44 @@ def _check_found(
     Raises:
         InputError: the file is a simulation's ground truth, contradicts itself, or fails a check; the message names the slip.
     """
-    if found.format == TRUTH_FORMAT:
+    if imported.format == TRUTH_FORMAT:
         raise InputError(
             f"{source}: is the ground truth of a simulation, not a calibration; compare with it: cocalib check FILE --against"
         )
-    report = check(found, camera=camera, against=against, pairs=pairs)
+    report = check(imported, camera=camera, against=against, pairs=pairs)
     for result in report.results:
         if result.level == "error":
             raise InputError(f"{source}: {result.message}; {result.hint}")
     return report
 
 
-def _evidence(found: ImportedCalibration, report: CheckReport, *, tested: bool) -> Evidence:
+def _evidence(imported: ImportedCalibration, report: CheckReport, *, tested: bool) -> Evidence:
     """Return what an import rests on: reading alone never raises the level that a file states.
 
     Args:
-        found: what was read.
+        imported: what was read.
         report: of its check, which found no error.
         tested: whether it was held against pairs or another calibration.
     """
     proven = report.verdict == "right"
-    if found.evidence == "imported_assumed" and not tested:
+    if imported.evidence == "imported_assumed" and not tested:
         proven = False
     return "imported_proven" if proven else "imported_assumed"
 
 
 def adopt(
-    found: ImportedCalibration, source: str, *, camera: Camera | None = None, provenance: Provenance | None = None
+    imported: ImportedCalibration, source: str, *, camera: Camera | None = None, provenance: Provenance | None = None
 ) -> CalibrationFile:
     """Convert what a reader found to a calibration-1 file; `adoption` without anything to hold it against.
 
     Raises:
         InputError: the file contradicts itself, fails its own check point, states another camera, or there is no camera.
     """
-    return adoption(found, source, camera=camera, provenance=provenance).file
+    return adoption(imported, source, camera=camera, provenance=provenance).file
 
 
 def adoption(
-    found: ImportedCalibration,
+    imported: ImportedCalibration,
     source: str,
     *,
     camera: Camera | None = None,
@@ -318,7 +318,7 @@ def adoption(
     """Convert what a reader found to a calibration-1 file; calibration-1 keeps everything that it contains.
 
     Args:
-        found: what `read_any` returned.
+        imported: what `read_any` returned.
         source: the file's name, for error messages.
         camera: the intrinsics, if the file has none.
         provenance: where the calibration comes from.
@@ -329,47 +329,47 @@ def adoption(
     Raises:
         InputError: the file contradicts itself, fails a check, states another camera, or there is no camera.
     """
-    if found.file is not None and camera is not None:
+    if imported.file is not None and camera is not None:
         raise InputError(
             f"{source}: is calibration-1 and contains the camera it was solved with; omit the other camera"
         )
-    report = _check_found(found, source, camera=camera, against=against, pairs=pairs)
+    report = _check_found(imported, source, camera=camera, against=against, pairs=pairs)
     tested = against is not None or pairs is not None
-    if found.file is not None:
-        raised = tested and found.file.rests_on == "imported_assumed" and report.verdict == "right"
-        return Adoption(replace(found.file, evidence="imported_proven") if raised else found.file, report)
-    known = _camera(found, camera, source=source, replace_camera=replace_camera)
-    calibration = _as_calibration(found, source, camera=known)
+    if imported.file is not None:
+        raised = tested and imported.file.rests_on == "imported_assumed" and report.verdict == "right"
+        return Adoption(replace(imported.file, evidence="imported_proven") if raised else imported.file, report)
+    known = _camera(imported, camera, source=source, replace_camera=replace_camera)
+    calibration = _as_calibration(imported, source, camera=known)
     file = CalibrationFile(
         calibration,
-        found.frames or FrameNames(),
+        imported.frames or FrameNames(),
         choose_check_point(calibration),
         provenance or Provenance(),
-        evidence=_evidence(found, report, tested=tested),
+        evidence=_evidence(imported, report, tested=tested),
     )
     return Adoption(file, report)
 
 
-def _camera(found: ImportedCalibration, given: Camera | None, *, source: str, replace_camera: bool) -> Camera:
+def _camera(imported: ImportedCalibration, given: Camera | None, *, source: str, replace_camera: bool) -> Camera:
     """Return the camera of the file or the given one, which must not contradict each other.
 
     Raises:
         InputError: they image the same rays more than half a pixel apart, or there is neither.
     """
     if given is not None and not replace_camera:
-        _refuse_another_camera(found, given, source=source)
-    known = given or found.camera
-    if known is None and found.matrix_px is not None:
+        _refuse_another_camera(imported, given, source=source)
+    known = given or imported.camera
+    if known is None and imported.matrix_px is not None:
         raise InputError(
-            f"{source}: {found.format} states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT, "
-            "or give the intrinsics with --camera FILE"
+            f"{source}: {imported.format} states the camera matrix but not the image size; give it with --image-size WIDTH "
+            "HEIGHT, or give the intrinsics with --camera FILE"
         )
     if known is None:
-        raise InputError(f"{source}: {found.format} contains no camera; give its intrinsics with --camera FILE")
+        raise InputError(f"{source}: {imported.format} contains no camera; give its intrinsics with --camera FILE")
     return known
 
 
-def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source: str) -> None:
+def _refuse_another_camera(imported: ImportedCalibration, given: Camera, *, source: str) -> None:
     """Refuse a given camera that images the rays of the file's camera elsewhere.
 
     A file with a camera matrix alone is for undistorted images; that matrix is compared.
@@ -377,11 +377,11 @@ def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source:
     Raises:
         InputError: they image a ray more than half a pixel apart.
     """
-    stated, compared = found.camera, given
-    if stated is None and found.matrix_px is not None:
+    stated, compared = imported.camera, given
+    if stated is None and imported.matrix_px is not None:
         size = given.width_px, given.height_px
-        stated = found.camera_for(size)
-        if not found.distortion.any() and found.lens_model == "pinhole":
+        stated = imported.camera_for(size)
+        if not imported.distortion.any() and imported.lens_model == "pinhole":
             compared = Camera("pinhole", *size, given.matrix_px)
     apart_px = largest_difference_px(stated, compared) if stated is not None else 0.0
     if stated is None or apart_px <= _SAME_LENS_PX:
@@ -398,49 +398,49 @@ def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source:
     )
 
 
-def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
+def adopted_calibration(imported: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
     """Return what a reader found as a calibration with a given camera; whatever the file does not state is unknown.
 
     Args:
-        found: what `read_any` returned.
+        imported: what `read_any` returned.
         source: the file's name, for error messages and the warning.
         camera: the intrinsics to use.
 
     Raises:
         InputError: the file contradicts itself, or fails its own check point.
     """
-    _check_found(found, source, camera=camera)
-    return _as_calibration(found, source, camera=camera)
+    _check_found(imported, source, camera=camera)
+    return _as_calibration(imported, source, camera=camera)
 
 
-def _as_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
+def _as_calibration(imported: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
     """Return what was read and checked as a calibration with a given camera."""
-    assumed = tuple(DataWarning.reported("assumed", note, "verify this assumption") for note in found.assumptions)
+    assumed = tuple(DataWarning.reported("assumed", note, "verify this assumption") for note in imported.assumptions)
     return Calibration(
-        camera_from_radar=found.camera_from_radar,
-        covariance=_covariance(found),
+        camera_from_radar=imported.camera_from_radar,
+        covariance=_covariance(imported),
         camera=camera,
         metrics=Metrics(),
         pairs=(),
         unpaired=(),
-        warnings=(*assumed, _imported_warning(found, source)),
+        warnings=(*assumed, _imported_warning(imported, source)),
         options=CalibrationOptions(),
-        radar_errors=found.file.calibration.radar_errors if found.file else RadarErrors(),
-        systematic_errors=found.file.calibration.systematic_errors if found.file else (),
-        covariance_parts=found.file.calibration.covariance_parts if found.file else None,
+        radar_errors=imported.file.calibration.radar_errors if imported.file else RadarErrors(),
+        systematic_errors=imported.file.calibration.systematic_errors if imported.file else (),
+        covariance_parts=imported.file.calibration.covariance_parts if imported.file else None,
     )
 
 
-def _covariance(found: ImportedCalibration) -> Matrix66:
-    if found.file is not None:
-        return found.file.calibration.covariance
-    return np.full((6, 6), _UNKNOWN) if found.covariance is None else found.covariance
+def _covariance(imported: ImportedCalibration) -> Matrix66:
+    if imported.file is not None:
+        return imported.file.calibration.covariance
+    return np.full((6, 6), _UNKNOWN) if imported.covariance is None else imported.covariance
 
 
-def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
+def _imported_warning(imported: ImportedCalibration, source: str) -> DataWarning:
     return DataWarning.reported(
         "imported",
-        f"imported from {PurePath(source).name} ({found.format}): its pairs and input data are unknown",
+        f"imported from {PurePath(source).name} ({imported.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
 

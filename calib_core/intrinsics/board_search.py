@@ -324,11 +324,11 @@ def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[Boar
     kept = _without_duplicates(sharp, outlines, left_out)
     if len(kept) > MOST_VIEWS:
         different = set(_most_different(outlines[kept], np.array([sharp[row].blur_px for row in kept])))
-        for place, row in enumerate(kept):
-            if place not in different:
+        for index, row in enumerate(kept):
+            if index not in different:
                 reason = f"not needed: {MOST_VIEWS} views that differ more from one another are used"
                 left_out.append(LeftOutImage(sharp[row].index, sharp[row].name, reason, spare=True))
-        kept = [row for place, row in enumerate(kept) if place in different]
+        kept = [row for index, row in enumerate(kept) if index in different]
     return [sharp[row] for row in kept], left_out
 
 

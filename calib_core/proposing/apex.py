@@ -217,9 +217,9 @@ def _proposals(levels: dict[int, _Reduced], near_px: Vector2, reach_px: float) -
     return chosen
 
 
-def _are_apart(one: _Proposal, other: _Proposal) -> bool:
-    distance_px = float(np.hypot(*(one.pixel_px - other.pixel_px)))
-    return distance_px > max(2.5, 0.4 * max(one.factor * one.radius_px, other.factor * other.radius_px))
+def _are_apart(proposal: _Proposal, other: _Proposal) -> bool:
+    distance_px = float(np.hypot(*(proposal.pixel_px - other.pixel_px)))
+    return distance_px > max(2.5, 0.4 * max(proposal.factor * proposal.radius_px, other.factor * other.radius_px))
 
 
 def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float) -> Iterator[_Proposal]:

@@ -54,8 +54,8 @@ def with_apexes(candidates: Sequence[ImageCandidate], image: np.ndarray, width_p
     """
     found: list[ImageCandidate] = []
     least = _LEAST_SHARE * max((one.strength for one in candidates), default=0.0)
-    for place, candidate in enumerate(candidates):
-        tried = place < _TRIED and candidate.strength >= least
+    for index, candidate in enumerate(candidates):
+        tried = index < _TRIED and candidate.strength >= least
         moved = _at_apex(candidate, image, width_px, tried=tried)
         if all(float(np.hypot(*(moved.pixel_px - other.pixel_px))) > 0.3 * width_px for other in found):
             found.append(moved)

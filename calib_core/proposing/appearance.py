@@ -131,9 +131,9 @@ def _looked_at(view: DwellView, looks: Sequence[Appearance], frames: FrameSource
     rough.sort(key=lambda pair: -pair[0].likeness)
     candidates: list[ImageCandidate] = []
     size_px = np.array([camera.width_px, camera.height_px])
-    for place, (match, candidate) in enumerate(rough):
+    for index, (match, candidate) in enumerate(rough):
         moved = replace(candidate, likeness=match.likeness)
-        if place < _REFINED:
+        if index < _REFINED:
             fine = _best_match(candidate, [match.look], view.width_px, _FINE_WIDTH_PX, _FINER)
             moved = _moved(candidate, fine, view.width_px)
         inside = bool(((moved.pixel_px > -0.5) & (moved.pixel_px < size_px - 0.5)).all())

@@ -252,12 +252,12 @@ def _taken_by_others(views: Sequence[DwellView], rays: CandidateRays, probabilit
     """Return which candidates (n, k) are the place of another dwell at the same time, to which it belongs more probably."""
     taken = np.zeros(rays.odds.shape, dtype=np.bool_)
     order = np.argsort(-probability.max(axis=1), kind="stable").tolist()
-    for place, i in enumerate(order):
+    for index, i in enumerate(order):
         free = np.where(taken[i], 0.0, probability[i])
         k = int(np.argmax(free))
         if free[k] < LEAST_CONFIDENCE:
             continue
-        for j in order[place + 1 :]:
+        for j in order[index + 1 :]:
             one, other = views[i].placement, views[j].placement
             if one.start < other.end and other.start < one.end:
                 off = np.linalg.norm(rays.rays[j] - rays.rays[i, k], axis=1)

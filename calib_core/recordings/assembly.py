@@ -339,10 +339,10 @@ def _radar_stream(
     """Build the stream of the radar in use, of one topic or of several."""
     parts = [_topic_stream(topic, inventory, stamps[topic.name], stamped[topic.name].heads) for topic in used.radars]
     repeats = list(choice.sensors[0].repeats) if choice.sensors else list(range(len(parts)))
-    for place, part in enumerate(tuple(parts)):
+    for index, part in enumerate(tuple(parts)):
         others = other_azimuths(part)
         parts.extend(others)
-        repeats.extend([repeats[place]] * len(others))
+        repeats.extend([repeats[index]] * len(others))
     if len(parts) < 2:
         return parts[0] if parts else None
     return MergedStream(parts, repeats)

@@ -35,11 +35,11 @@ def claim_warnings(radar: RadarStream) -> list[DataWarning]:
     return _contradictions(name, plan, radar.claims(_SAMPLED_SCANS)) if any(plan.claimed) else []
 
 
-def _contradictions(name: str, plan: ColumnPlan, found: Returns) -> list[DataWarning]:
-    if found.claimed_polar is None:
+def _contradictions(name: str, plan: ColumnPlan, returns: Returns) -> list[DataWarning]:
+    if returns.claimed_polar is None:
         return []
-    sound = np.isfinite(found.points_radar_m).all(axis=1)
-    points, claimed = found.points_radar_m[sound], found.claimed_polar[sound]
+    sound = np.isfinite(returns.points_radar_m).all(axis=1)
+    points, claimed = returns.points_radar_m[sound], returns.claimed_polar[sound]
     if len(points) < _FEW:
         return []
     if plan.polar:

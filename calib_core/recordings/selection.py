@@ -589,8 +589,8 @@ def _frame_warnings(examined: Sequence[Examined]) -> list[DataWarning]:
 
 def _radar_text(sensor: RadarSensor) -> str:
     """Describe a radar by its topics, frame and figures."""
-    own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
-    second = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
+    own = [name for index, name in enumerate(sensor.topics) if sensor.repeats[index] == index]
+    second = [name for index, name in enumerate(sensor.topics) if sensor.repeats[index] != index]
     what = " + ".join(own)
     if len(own) > 1:
         what += " as one radar"

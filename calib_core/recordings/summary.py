@@ -448,19 +448,19 @@ def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
     return lines
 
 
-def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
+def clock_lines(diagnosis: ClockDiagnosis) -> tuple[str, ...]:
     """Describe which clock a topic uses and why, and in a second line, if needed, what is known about both clocks."""
-    if found.times_from:
-        return (f"times are {found.times_from}", *(["; ".join(found.remarks)] if found.remarks else []))
-    used = {"header": "header stamps", "receive": "the recorder's receive times"}[found.chosen]
+    if diagnosis.times_from:
+        return (f"times are {diagnosis.times_from}", *(["; ".join(diagnosis.remarks)] if diagnosis.remarks else []))
+    used = {"header": "header stamps", "receive": "the recorder's receive times"}[diagnosis.chosen]
     about = []
-    if found.delay_s == 0 and found.delay_jitter_s == 0:
+    if diagnosis.delay_s == 0 and diagnosis.delay_jitter_s == 0:
         about.append("the recorder's receive times are equal to the stamps")
-    elif found.delay_s is not None:
-        jitter = f"± {(found.delay_jitter_s or 0) * 1e3:.1f} ms"
-        about.append(f"the recorder received each message {_delay_text(found.delay_s)} its stamp ({jitter})")
-    about.extend(found.remarks)
-    return (f"times are {used}, because {found.reason}", *(["; ".join(about)] if about else []))
+    elif diagnosis.delay_s is not None:
+        jitter = f"± {(diagnosis.delay_jitter_s or 0) * 1e3:.1f} ms"
+        about.append(f"the recorder received each message {_delay_text(diagnosis.delay_s)} its stamp ({jitter})")
+    about.extend(diagnosis.remarks)
+    return (f"times are {used}, because {diagnosis.reason}", *(["; ".join(about)] if about else []))
 
 
 def _delay_text(delay_s: float) -> str:
@@ -492,11 +492,11 @@ def _sensors(summary: RecordingSummary) -> list[str]:
     if summary.radar is None or not summary.radar.choice:
         return []
     rows = [("used", "radar", "frame", "returns a scan", "rate", "range", "static", "topics")]
-    for place, sensor in enumerate(summary.sensors):
+    for index, sensor in enumerate(summary.sensors):
         figures = sensor.figures
         rows.append(
             (
-                "" if place else "yes",
+                "" if index else "yes",
                 sensor.name,
                 sensor.frame,
                 f"{figures.returns_per_scan:.0f}",
@@ -510,8 +510,8 @@ def _sensors(summary: RecordingSummary) -> list[str]:
 
 
 def _topics_of(sensor: RadarSensor) -> str:
-    second = [f"{name} (other azimuths)" for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
-    own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
+    second = [f"{name} (other azimuths)" for index, name in enumerate(sensor.topics) if sensor.repeats[index] != index]
+    own = [name for index, name in enumerate(sensor.topics) if sensor.repeats[index] == index]
     return ", ".join([*own, *second, *(f"{name} (the same returns, not read)" for name in sensor.copies)])
 
 

@@ -279,38 +279,38 @@ def _lines(file: IO[bytes]) -> list[str]:
     return [line for line in file.read(1 << 16).decode("utf-8", "replace").splitlines() if line.strip()]
 
 
-def verification_text(found: Verification) -> str:
+def verification_text(verification: Verification) -> str:
     """Format a verification as text: files, messages by topic, the result last."""
-    lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in found.files]
-    lines += ["", *_table(found), *_faults(found), ""]
-    for warning in found.warnings:
+    lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in verification.files]
+    lines += ["", *_table(verification), *_faults(verification), ""]
+    for warning in verification.warnings:
         lines.append(f"warning   {warning.message}. [{warning.code}]")
-    lines.append(f"result    {_result(found)}")
+    lines.append(f"result    {_result(verification)}")
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _table(found: Verification) -> Iterator[str]:
-    rows = [("topic", *_COUNTS), *((topic.topic, *map(str, _counts(topic))) for topic in found.topics)]
+def _table(verification: Verification) -> Iterator[str]:
+    rows = [("topic", *_COUNTS), *((topic.topic, *map(str, _counts(topic))) for topic in verification.topics)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for name, *counts in rows:
         cells = [count.rjust(width) for count, width in zip(counts, widths[1:], strict=True)]
         yield "  ".join([name.ljust(widths[0]), *cells])
 
 
-def _counts(one: TopicCheck) -> tuple[int, ...]:
-    return one.read, one.unread, one.damaged, one.undecodable
+def _counts(check: TopicCheck) -> tuple[int, ...]:
+    return check.read, check.unread, check.damaged, check.undecodable
 
 
-def _faults(found: Verification) -> Iterator[str]:
-    for topic in found.topics:
+def _faults(verification: Verification) -> Iterator[str]:
+    for topic in verification.topics:
         if topic.fault:
             yield f"  {topic.topic}: {topic.fault}"
 
 
-def _result(found: Verification) -> str:
-    if found.sound:
+def _result(verification: Verification) -> str:
+    if verification.sound:
         return "sound: everything was read, and nothing is damaged or lost"
-    sums = [sum(column) for column in zip(*map(_counts, found.topics), strict=True)] or [0] * len(_COUNTS)
+    sums = [sum(column) for column in zip(*map(_counts, verification.topics), strict=True)] or [0] * len(_COUNTS)
     named = [
         f"{count} messages {name}" for name, count in zip(_COUNTS, sums, strict=True) if count and name in _COUNTS[2:]
     ]

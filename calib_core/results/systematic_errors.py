@@ -654,12 +654,12 @@ def _angle_scale(error: SystematicErrorResult, *, flat: bool, measured: bool) ->
     return DataWarning("angle-scale", facts)
 
 
-def _by_pairs_alone(one: SystematicErrorResult, by_fit: float) -> tuple[float, float]:
+def _by_pairs_alone(result: SystematicErrorResult, by_fit: float) -> tuple[float, float]:
     """Return size and standard deviation of an error without its prior, which draws the estimate to 0.
 
     With p the prior and s what independent noise leaves of it, the estimate is k = 1 - s^2 / p^2 times that of the pairs alone,
     so that with their variance v, smooth errors included, its own is v k^2 + (1 - k)^2 p^2.
     """
-    prior, share = one.prior_sigma, max(1.0 - (by_fit / one.prior_sigma) ** 2, _LEAST_TOLD)
-    variance = one.sigma**2 - ((1.0 - share) * prior) ** 2
-    return abs(one.value) / share, float(np.sqrt(max(variance, 0.0))) / share
+    prior, share = result.prior_sigma, max(1.0 - (by_fit / result.prior_sigma) ** 2, _LEAST_TOLD)
+    variance = result.sigma**2 - ((1.0 - share) * prior) ** 2
+    return abs(result.value) / share, float(np.sqrt(max(variance, 0.0))) / share

@@ -387,7 +387,7 @@ def _spread(rng: np.random.Generator, count: int) -> Points2:
 
 
 def _draw_board_pose(
-    rng: np.random.Generator, outline: Points3, middle: np.ndarray, camera: Camera, place: Vector2
+    rng: np.random.Generator, outline: Points3, middle: np.ndarray, camera: Camera, vector2: Vector2
 ) -> RigidTransform | None:
     """Draw a tilt and a size, and shift the board into the region; None if it does not fit there."""
     bearing, tilt = rng.uniform(0.0, 2.0 * np.pi), _TILT_RAD * np.sqrt(rng.uniform())
@@ -396,7 +396,7 @@ def _draw_board_pose(
         np.array([0.0, 0.0, roll])
     )
     low, high = _RIM_PX, np.array([camera.width_px, camera.height_px]) - 1 - _RIM_PX
-    centre = low + place * (high - low)
+    centre = low + vector2 * (high - low)
     distance = float(np.ptp(outline[:, 0]) * camera.matrix_px[0, 0] / (rng.uniform(*_SIZE) * camera.width_px))
     for _ in range(_SHIFTS):
         ray = camera.rays(centre[None])[0]

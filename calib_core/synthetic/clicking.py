@@ -79,7 +79,7 @@ def _intentions(rng: np.random.Generator, stage: Stage, placements: tuple[Simula
     """Decide which placement is clicked in which frame; a frame has at most one click."""
     clicking = stage.options.clicking
     taken = {placement.best_image_time for placement in placements}
-    found: list[_Intention] = []
+    intentions: list[_Intention] = []
     for index, placement in enumerate(placements):
         times = [placement.best_image_time]
         for _ in range(clicking.clicks_per_placement - 1):
@@ -87,8 +87,8 @@ def _intentions(rng: np.random.Generator, stage: Stage, placements: tuple[Simula
         for count, time in enumerate(times):
             late = bool(clicking.late_share) and float(rng.uniform()) < clicking.late_share
             later = _other_frame(rng, stage, index + stage.options.reflectors, taken) if late else []
-            found.append(_Intention(index, later[0] if later else time, count, bool(later)))
-    return found
+            intentions.append(_Intention(index, later[0] if later else time, count, bool(later)))
+    return intentions
 
 
 def _other_frame(rng: np.random.Generator, stage: Stage, index: int, taken: set[TimeNs]) -> list[TimeNs]:

@@ -63,9 +63,9 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
     return "\n".join([_HEAD, *(_text(row, home) for row in rows), *left_out, *[""] * bool(left_out)]), len(rows)
 
 
-def _left_out(folder: Path, found: Sequence[ManifestRow]) -> Iterator[str]:
+def _left_out(folder: Path, rows: Sequence[ManifestRow]) -> Iterator[str]:
     """Yield a comment for each folder of images, tables or videos beside which there is no recording."""
-    taken = {path.parent for one in found for path in one.recording} - {folder}
+    taken = {path.parent for row in rows for path in row.recording} - {folder}
     for where, inside, names in os.walk(folder):
         inside[:] = sorted(name for name in inside if not name.startswith(".") and Path(where, name) not in taken)
         kinds = Counter(suffix for name in names if (suffix := Path(name).suffix.lower()) in _PLAIN_SUFFIXES)
@@ -131,16 +131,16 @@ def _without_sensor(path: Path) -> str:
     return "-".join(word for word in stem.split() if word.lower() not in _SENSORS)
 
 
-def _text(found: ManifestRow, home: Path) -> str:
-    where = found.recording[0].parent
+def _text(row: ManifestRow, home: Path) -> str:
+    where = row.recording[0].parent
     clicks = [path for path in sorted(where.glob("*.json")) if _has_clicks(path)]
-    alone = len([*_recordings(where)]) <= len(found.recording)
-    camera = intrinsics_near(found.recording)
+    alone = len([*_recordings(where)]) <= len(row.recording)
+    camera = intrinsics_near(row.recording)
     lines = [
         "[[session]]",
-        f"vehicle = {_quoted(found.vehicle)}",
-        f"session = {_quoted(found.session)}",
-        f"recording = {_quoted_paths(found.recording, home)}",
+        f"vehicle = {_quoted(row.vehicle)}",
+        f"session = {_quoted(row.session)}",
+        f"recording = {_quoted_paths(row.recording, home)}",
         f"clicks = {_quoted(_relative(clicks[0], home))}" if len(clicks) == 1 and alone else _NOT_CLICKED,
     ]
     if len(clicks) > 1 or (clicks and not alone):

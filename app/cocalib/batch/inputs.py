@@ -86,7 +86,7 @@ def inputs_of(row: ManifestRow) -> tuple[InputPath, ...]:
 def all_reached(inputs: tuple[InputPath, ...]) -> bool:
     """Return whether all inputs are there, as far as one can tell without reading them."""
     try:
-        return all(os.access(file.path, os.R_OK) for one in inputs for file in one.files())
+        return all(os.access(file.path, os.R_OK) for path in inputs for file in path.files())
     except OSError:
         return False
 

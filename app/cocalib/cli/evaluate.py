@@ -85,7 +85,7 @@ class Evaluate:
         return tuple(one for one in self.require if one not in _LEVELS)
 
     def _print_report(
-        self, found: "ImportedCalibration", calibration: "Calibration | None", evaluation: "Evaluation | None"
+        self, imported: "ImportedCalibration", calibration: "Calibration | None", evaluation: "Evaluation | None"
     ) -> int:
         """Print the figures and what is required; return the exit code."""
         from calib_core.evaluation.evaluation_json import evaluation_json
@@ -95,11 +95,11 @@ class Evaluate:
 
         assert self.calibration is not None
         limits = limits_met(self._limits(), calibration)
-        verdict = found.file.verdict if found.file is not None else None
+        verdict = imported.file.verdict if imported.file is not None else None
         level = next((level for level in reversed(_LEVELS) if level in self.require), None)
         code = NO_ANSWER if self.judging.recording and evaluation is None else DONE
         code = code if evaluation is None else evaluation_exit_code(evaluation)
-        code = code or exit_code(verdict.level if verdict else None, found.evidence, level)
+        code = code or exit_code(verdict.level if verdict else None, imported.evidence, level)
         code = code or (DONE if all(limit.met for limit in limits) else IN_DOUBT)
         if evaluation is not None and self.json:
             names = [path.name for path in self.judging.recording]
@@ -191,7 +191,7 @@ class Evaluate:
         return replace(subject, against=against_of(self.against.name, others, other, found, camera=lens, judged=better))
 
     def _on_recording(
-        self, found: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
+        self, imported: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
         from cocalib.evaluation.recording_check import other_camera, require_size
@@ -201,13 +201,13 @@ class Evaluate:
         name = self.calibration.name
         with self.judging.recorded.open(require=("radar",)) as recording:
             recorded = recording.camera()
-            calibration = known_calibration(found, name, camera=camera or recorded)
+            calibration = known_calibration(imported, name, camera=camera or recorded)
             if calibration is not None:
                 require_size(calibration.camera, recording, self.calibration)
             with progress_bar("hashing") as progress:
                 hashes = recording.fingerprint(progress)
-            seen = watched(recording, calibration, hashes, other_camera(found, recorded))
-            subject = replace(subject_of(found, calibration, name), recording=seen)
+            seen = watched(recording, calibration, hashes, other_camera(imported, recorded))
+            subject = replace(subject_of(imported, calibration, name), recording=seen)
             if calibration is None:
                 return subject, ()
             return self._subject_of(subject, calibration, other, recording)

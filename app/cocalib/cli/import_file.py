@@ -281,7 +281,9 @@ _RESTS_ON = {
 }
 
 
-def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None) -> "Camera | None":
+def _sized_camera(
+    imported: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None
+) -> "Camera | None":
     """Return the camera of a file that states its matrix but no size, if the size is given or images are beside it.
 
     Raises:
@@ -290,7 +292,7 @@ def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple
     from calib_core.recordings import size_of_images_beside
     from cocalib.opening.opened import camera_of
 
-    if found.matrix_px is None:
+    if imported.matrix_px is None:
         if image_size_px is not None:
             raise InputError(f"{path}: --image-size is for files with a camera matrix and no size; remove it")
         return None
@@ -299,4 +301,4 @@ def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple
         return None
     if image_size_px is None:
         print(f"note: image size {size_px[0]} x {size_px[1]} px from the images beside the file", file=sys.stderr)
-    return camera_of(found, path, size_px)
+    return camera_of(imported, path, size_px)

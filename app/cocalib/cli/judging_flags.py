@@ -137,7 +137,7 @@ class EvidenceFlags:
         times = recording.image_times if len(recording.image_times) else recording.radar_times
         if not len(times):
             return ()
-        kept = (clicks_in(found, int(times[0]), int(times[-1])) for found in calibrations)
+        kept = (clicks_in(imported, int(times[0]), int(times[-1])) for imported in calibrations)
         return next((clicks for clicks in kept if clicks), ())
 
 

@@ -111,7 +111,7 @@ class Session:
         return 0 if found.is_complete else 3
 
 
-def _session_folder(place: Path) -> Path:
+def _session_folder(path: Path) -> Path:
     """Return a session folder as given, or the one of a recording.
 
     Raises:
@@ -119,32 +119,32 @@ def _session_folder(place: Path) -> Path:
     """
     from cocalib.session.file.finding import holds_session_files, recording_session_folder
 
-    if not place.exists() and not place.is_symlink():
-        raise InputError(f"{place}: no such folder; find sessions with cocalib session list FOLDER")
-    if ".cocalib-session" in place.name or holds_session_files(place):
-        return place
-    folder = recording_session_folder([place])
+    if not path.exists() and not path.is_symlink():
+        raise InputError(f"{path}: no such folder; find sessions with cocalib session list FOLDER")
+    if ".cocalib-session" in path.name or holds_session_files(path):
+        return path
+    folder = recording_session_folder([path])
     if not folder.is_dir():
         raise InputError(
-            f"{place}: has no session next to it or in your user folder; find sessions with cocalib session list"
+            f"{path}: has no session next to it or in your user folder; find sessions with cocalib session list"
         )
     return folder
 
 
-def _findings(found: "Repair") -> list[str]:
+def _findings(repair: "Repair") -> list[str]:
     """Return what a session proves and what is wrong with it, line by line."""
-    lines = [f"{found.folder}: session of {found.recording}", *(f"  {fault}" for fault in found.faults)]
+    lines = [f"{repair.folder}: session of {repair.recording}", *(f"  {fault}" for fault in repair.faults)]
     lines.append(
-        f"  proven: {_click_count(len(found.clicks), 'click')}, from {_click_count(found.steps, 'step')} of the journal"
+        f"  proven: {_click_count(len(repair.clicks), 'click')}, from {_click_count(repair.steps, 'step')} of the journal"
     )
-    if found.unproven:
-        lines.append(f"  not proven, and left out: {_click_count(found.unproven, 'line')} of the journal")
-    elif found.faults and found.is_complete:
+    if repair.unproven:
+        lines.append(f"  not proven, and left out: {_click_count(repair.unproven, 'line')} of the journal")
+    elif repair.faults and repair.is_complete:
         lines.append("  as far as the files show, no click is missing")
-    elif found.faults:
+    elif repair.faults:
         lines.append("  which of the two files is right cannot be proven; the other one stays as a backup")
-    if found.torn_bytes:
-        lines.append(f"  {found.torn}")
+    if repair.torn_bytes:
+        lines.append(f"  {repair.torn}")
     return lines
 
 

@@ -90,9 +90,9 @@ _VALUES = ConstructorRegistry()
 
 
 @_VALUES.primitive_rule
-def _optional_number(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+def _optional_number(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     """Show a number that may be unset as FLOAT or INT, not as {None}|FLOAT."""
-    kind = next((kind for kind in (float, int) if set(typing.get_args(found.type)) == {kind, type(None)}), None)
+    kind = next((kind for kind in (float, int) if set(typing.get_args(info.type)) == {kind, type(None)}), None)
     if kind is None:
         return None
     return PrimitiveConstructorSpec(
@@ -105,9 +105,9 @@ def _optional_number(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] 
 
 
 @_VALUES.primitive_rule
-def _text(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+def _text(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     """Show a text as TEXT, not as STR."""
-    if found.type is not str:
+    if info.type is not str:
         return None
     return PrimitiveConstructorSpec(
         nargs=1,

@@ -113,17 +113,17 @@ def comparison_document(compared: ComparedOnRecording) -> dict[str, Any]:
     }
 
 
-def _difference(found: PairedDifference | None) -> dict[str, Any] | None:
-    if found is None:
+def _difference(difference: PairedDifference | None) -> dict[str, Any] | None:
+    if difference is None:
         return None
     return {
-        "b_minus_a": found.mean,
-        "standard_error": found.standard_error,
-        "low": found.low,
-        "high": found.high,
-        "p_value": found.p_value,
-        "groups": found.groups,
-        "winner": found.winner,
+        "b_minus_a": difference.mean,
+        "standard_error": difference.standard_error,
+        "low": difference.low,
+        "high": difference.high,
+        "p_value": difference.p_value,
+        "groups": difference.groups,
+        "winner": difference.winner,
     }
 
 

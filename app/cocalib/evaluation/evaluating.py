@@ -154,7 +154,7 @@ def evidence_in(
 
 def judged(
     calibration: Calibration,
-    found: Evidence,
+    evidence: Evidence,
     *,
     held_out: bool = True,
     progress: Callable[[int, int], None] | None = None,
@@ -163,20 +163,20 @@ def judged(
 
     Args:
         calibration: with the lens that the evidence was found with.
-        found: in the recording.
+        evidence: in the recording.
         held_out: also predict the clicks of each placement from the others.
         progress: called with the steps done and their number.
     """
     residuals = boxes = None
-    warnings = list(found.warnings)
-    if found.clicks is not None:
+    warnings = list(evidence.warnings)
+    if evidence.clicks is not None:
         residuals = residual_figures(
-            found.clicks, calibration, unpaired=found.unpaired, with_held_out=held_out, progress=progress
+            evidence.clicks, calibration, unpaired=evidence.unpaired, with_held_out=held_out, progress=progress
         )
-    if found.returns is not None:
+    if evidence.returns is not None:
         pose, lens = calibration.camera_from_radar, calibration.camera
-        boxes = judged_by_boxes(pose, lens, found.returns, radar_errors=calibration.radar_errors, progress=progress)
-        warnings += _turned_warnings(calibration, found.returns)
+        boxes = judged_by_boxes(pose, lens, evidence.returns, radar_errors=calibration.radar_errors, progress=progress)
+        warnings += _turned_warnings(calibration, evidence.returns)
     return Evaluation(residuals, boxes, tuple(warnings))
 
 

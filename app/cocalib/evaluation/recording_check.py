@@ -26,15 +26,15 @@ _NEAR_PX = 10.0
 _NAMED = 5
 
 
-def clicks_in(found: ImportedCalibration, first_ns: int, last_ns: int) -> tuple[ReflectorClick, ...]:
+def clicks_in(imported: ImportedCalibration, first_ns: int, last_ns: int) -> tuple[ReflectorClick, ...]:
     """Return the clicks that a calibration-1 file keeps in its pairs, if all of them are within a recording; else none.
 
     Args:
-        found: what was read.
+        imported: what was read.
         first_ns: stamp of the recording's first frame.
         last_ns: of its last.
     """
-    pairs = [pair for pair in found.file.calibration.pairs if pair.measured is not None] if found.file else []
+    pairs = [pair for pair in imported.file.calibration.pairs if pair.measured is not None] if imported.file else []
     clicks = [
         ReflectorClick(
             pair.image_time, pair.id, float(pair.pixel_px[0]), float(pair.pixel_px[1]), chosen=pair.measured.chosen
@@ -46,9 +46,9 @@ def clicks_in(found: ImportedCalibration, first_ns: int, last_ns: int) -> tuple[
     return tuple(clicks) if within else ()
 
 
-def stale_inputs(found: ImportedCalibration, inputs: Sequence[InputFile]) -> tuple[CheckResult, ...]:
+def stale_inputs(imported: ImportedCalibration, inputs: Sequence[InputFile]) -> tuple[CheckResult, ...]:
     """Say which files of a recording are not those that the calibration names as its inputs, though they have their names."""
-    named = {one.name: one for one in found.file.provenance.inputs} if found.file else {}
+    named = {one.name: one for one in imported.file.provenance.inputs} if imported.file else {}
     return tuple(
         CheckResult(
             "warning",
@@ -62,24 +62,24 @@ def stale_inputs(found: ImportedCalibration, inputs: Sequence[InputFile]) -> tup
     )
 
 
-def other_camera(found: ImportedCalibration, camera: Camera | None) -> tuple[CheckResult, ...]:
+def other_camera(imported: ImportedCalibration, camera: Camera | None) -> tuple[CheckResult, ...]:
     """Say that a recording states another lens than the calibration, which is projected through its own."""
-    if found.camera is None or camera is None:
+    if imported.camera is None or camera is None:
         return ()
-    lenses = lenses_of(found, dataclasses.replace(found, camera=camera), None)
+    lenses = lenses_of(imported, dataclasses.replace(imported, camera=camera), None)
     lens = lenses.difference if lenses else None
-    if lens is None or lens.same or _was_refined_from(found, camera):
+    if lens is None or lens.same or _was_refined_from(imported, camera):
         return ()
     message = f"the recording states other intrinsics than the calibration: {lens.text}"
     return (CheckResult("warning", "other-lens", message, "the residuals are through the calibration's own"),)
 
 
-def _was_refined_from(found: ImportedCalibration, camera: Camera) -> bool:
+def _was_refined_from(imported: ImportedCalibration, camera: Camera) -> bool:
     """Return whether a calibration's intrinsics are refined ones, and a recording states those they were refined from."""
-    given = found.file.calibration.given_camera if found.file is not None else None
+    given = imported.file.calibration.given_camera if imported.file is not None else None
     if given is None:
         return False
-    lenses = lenses_of(dataclasses.replace(found, camera=given), dataclasses.replace(found, camera=camera), None)
+    lenses = lenses_of(dataclasses.replace(imported, camera=given), dataclasses.replace(imported, camera=camera), None)
     return lenses is not None and lenses.difference is not None and lenses.difference.same
 
 
@@ -119,25 +119,25 @@ def with_recording(
     return dataclasses.replace(report, results=(*report.results, result))
 
 
-def calibration_of(found: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
+def calibration_of(imported: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
     """Return what was read as a calibration.
 
     Args:
-        found: what was read.
+        imported: what was read.
         source: the file's name, for error messages.
         camera: the intrinsics, if the file has none.
 
     Raises:
         InputError: there are none, or the file contradicts itself.
     """
-    if found.file is not None:
-        return found.file.calibration
-    known = found.camera or camera
+    if imported.file is not None:
+        return imported.file.calibration
+    known = imported.camera or camera
     if known is None:
         raise InputError(
             f"{source}: neither the file nor the recording has intrinsics to project with; give --camera FILE"
         )
-    return adopted_calibration(found, source, camera=known)
+    return adopted_calibration(imported, source, camera=known)
 
 
 def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
@@ -188,12 +188,12 @@ class JudgedCalibration:
 
 
 def judged_calibration(
-    found: ImportedCalibration, path: Path, recording: Recording, *, camera: Camera | None = None
+    imported: ImportedCalibration, path: Path, recording: Recording, *, camera: Camera | None = None
 ) -> JudgedCalibration:
     """Return what was read as a calibration that can be judged on a recording.
 
     Args:
-        found: what was read.
+        imported: what was read.
         path: of its file, for messages.
         recording: that it is judged on.
         camera: the intrinsics, if the file has none.
@@ -202,11 +202,11 @@ def judged_calibration(
         InputError: there are no intrinsics, or they are of images of another size.
     """
     recorded = recording.camera()
-    calibration = calibration_of(found, str(path), camera or recorded)
+    calibration = calibration_of(imported, str(path), camera or recorded)
     require_size(calibration.camera, recording, path)
-    lens = other_camera(found, recorded)
+    lens = other_camera(imported, recorded)
     return JudgedCalibration(
-        found,
+        imported,
         calibration,
         tuple(_meaning_warning(path, one) for one in lens),
     )

@@ -227,14 +227,14 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     return dataclasses.replace(frames, notes=(*frames.notes, note))
 
 
-def _import_clicks(workspace: Workspace, source: str, found: ClicksAtFrames) -> None:
+def _import_clicks(workspace: Workspace, source: str, frames: ClicksAtFrames) -> None:
     """Start a new session with the clicks of a file; one that has steps already goes on as it is."""
     if workspace.restored.steps > 0:
         print(f"Continuing the existing session; {source} was not imported (start over with --fresh)")
         return
-    for line in found.notes:
+    for line in frames.notes:
         print(f"note: {line}", file=sys.stderr)
-    workspace.dispatch(ClicksImported.of(found.clicks))
+    workspace.dispatch(ClicksImported.of(frames.clicks))
 
 
 def _close(workspace: Workspace, kind: type[BaseException] | None, *_: object) -> None:
@@ -370,16 +370,16 @@ def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path 
     return SessionOffer(str(folder), len(repair.clicks), repair.recording, continues, choice.session_plan)
 
 
-def camera_of(found: ImportedCalibration, path: Path, size_px: tuple[int, int]) -> Camera | None:
+def camera_of(imported: ImportedCalibration, path: Path, size_px: tuple[int, int]) -> Camera | None:
     """Return the camera of a calibration for images of a size; None if it has none.
 
     Raises:
         InputError: its matrix is not a camera's, or is that of images of another size.
     """
-    if found.camera is None and found.matrix_px is not None:
-        refuse_another_size(found.matrix_px, size_px, str(path))
+    if imported.camera is None and imported.matrix_px is not None:
+        refuse_another_size(imported.matrix_px, size_px, str(path))
     try:
-        return found.camera_for(size_px)
+        return imported.camera_for(size_px)
     except ValueError as error:
         raise InputError(f"{path}: {error}; give the intrinsics with --camera FILE") from None
 

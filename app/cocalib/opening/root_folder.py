@@ -57,13 +57,13 @@ class RootFolder:
         self.require_inside(path, inside)
         return path
 
-    def require_inside(self, found: Path, inside: str) -> None:
+    def require_inside(self, path: Path, inside: str) -> None:
         """Refuse a real path that is not below the root.
 
         Raises:
             InputError: a link leads outside.
         """
-        if found != self.path and self.path not in found.parents:
+        if path != self.path and self.path not in path.parents:
             raise InputError(
                 f"{_entry_name(inside)}: is a link that leads out of {self.path}; start cocalib open with its own path instead"
             )

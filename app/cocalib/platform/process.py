@@ -55,12 +55,12 @@ def _end_in_time(_number: int, _: FrameType | None) -> None:
 def _unraisable(
     usual: Callable[["sys.UnraisableHookArgs"], object],
     heard: list[signal.Signals],
-    found: "sys.UnraisableHookArgs",
+    args: "sys.UnraisableHookArgs",
 ) -> None:
     """Send a signal again that came while an object was being deleted: Python drops what is raised there."""
-    interrupt = found.exc_value
+    interrupt = args.exc_value
     if not isinstance(interrupt, KeyboardInterrupt) or not interrupt.args:
-        usual(found)
+        usual(args)
         return
     for number in heard:
         signal.signal(number, _stop)

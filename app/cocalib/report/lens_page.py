@@ -333,8 +333,8 @@ def _errors_of_views(lens: CalibratedLens) -> Markup:
     step = axes.width / len(used)
     floor = axes.y(0.0)
     shapes: list[Child] = []
-    for place, (value, other) in enumerate(zip(used.tolist(), held_out.tolist(), strict=True)):
-        left, top = axes.left + step * (place + 0.15), axes.y(value)
+    for index, (value, other) in enumerate(zip(used.tolist(), held_out.tolist(), strict=True)):
+        left, top = axes.left + step * (index + 0.15), axes.y(value)
         shapes.append(tag("rect", x=left, y=top, width=0.7 * step, height=floor - top, class_="bar"))
         if np.isfinite(other):
             shapes.append(mark("used", left + 0.35 * step, axes.y(other)))

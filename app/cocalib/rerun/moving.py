@@ -87,9 +87,9 @@ def _stream_images(
     images: list[bytes] = []
     formats: list[str] = []
     times: list[int] = []
-    for place, time in enumerate(block.times_ns.tolist()):
+    for index, time in enumerate(block.times_ns.tolist()):
         try:
-            image = view.recording.image_bytes(block.first + place)
+            image = view.recording.image_bytes(block.first + index)
         except MessageError as error:
             streamed.skipped.add_unreadable(error)
             continue
@@ -99,7 +99,7 @@ def _stream_images(
         if sum(map(len, images)) >= _CHUNK_BYTES:
             _send_images(stream, images, formats, times, streamed)
             images, formats, times = [], [], []
-            yield block.first + place
+            yield block.first + index
     if images:
         _send_images(stream, images, formats, times, streamed)
     yield block.first + len(block.times_ns)

@@ -284,7 +284,7 @@ def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErro
 
 
 def _shares(group: Sequence[SystematicErrorResult]) -> tuple[float, float]:
-    return sum(one.position_share for one in group), sum(one.rotation_share for one in group)
+    return sum(result.position_share for result in group), sum(result.rotation_share for result in group)
 
 
 def _largest_share(group: Sequence[SystematicErrorResult]) -> float:

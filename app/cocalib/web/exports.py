@@ -79,14 +79,14 @@ class PoseInFile:
     in_third_frame: tuple[FileNumbers, ...] = ()
 
 
-def pose_in_file(found: ImportedCalibration, frames: FrameNames) -> PoseInFile:
+def pose_in_file(imported: ImportedCalibration, frames: FrameNames) -> PoseInFile:
     """Describe the pose that was read back from a file.
 
     Args:
-        found: what was read.
+        imported: what was read.
         frames: the names that the file was written with.
     """
-    pose = found.pose
+    pose = imported.pose
     camera = frames.camera if pose.axes == "optical" else frames.camera_link
     point = "p_camera" if pose.axes == "optical" else "p_link"
     written = pose.as_written()
@@ -99,11 +99,11 @@ def pose_in_file(found: ImportedCalibration, frames: FrameNames) -> PoseInFile:
         title, camera_axes = f"Pose of {camera} in {frames.radar}", written.rotation.T
     words = f"The numbers of this file {what}: {equation}."
     both: tuple[FileNumbers, ...] = ()
-    if found.in_third_frame is not None:
-        third = _THIRD_FRAMES.get(found.format, "the third frame")
+    if imported.in_third_frame is not None:
+        third = _THIRD_FRAMES.get(imported.format, "the third frame")
         both = tuple(
             FileNumbers(f"Pose of {name} in {third}", _rows(one))
-            for name, one in zip((frames.radar, camera), found.in_third_frame, strict=True)
+            for name, one in zip((frames.radar, camera), imported.in_third_frame, strict=True)
         )
         words = (
             f"The numbers of this file are the poses of {frames.radar!r} and of {camera!r} ({_CAMERA_WORDS[pose.axes]}) in "

@@ -117,19 +117,19 @@ def direction_by_facing(rotation: Matrix33) -> Direction | None:
     return fitting[0] if len(fitting) == 1 else None
 
 
-def with_camera(found: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
+def with_camera(imported: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
     """Return what was read with its camera; without an image size the camera is completed later, by `camera_for`.
 
     Raises:
         InputError: a parameter is invalid.
     """
     if camera is None:
-        return found
+        return imported
     if camera.size_px is not None:
-        return replace(found, camera=camera.camera(image_size_px=None, source=source))
+        return replace(imported, camera=camera.camera(image_size_px=None, source=source))
     model, distortion = camera.lens(source=source)
     return replace(
-        found, matrix_px=np.reshape(camera.matrix_px, (3, 3)), lens_model=model, distortion=np.array(distortion)
+        imported, matrix_px=np.reshape(camera.matrix_px, (3, 3)), lens_model=model, distortion=np.array(distortion)
     )
 
 

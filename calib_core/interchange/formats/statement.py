@@ -93,14 +93,14 @@ def stated_lines(value: object) -> str:
     return "\n".join(line for line in lines if isinstance(line, str)) if isinstance(lines, list) else ""
 
 
-def with_statement(found: ImportedCalibration, text: str) -> ImportedCalibration:
+def with_statement(imported: ImportedCalibration, text: str) -> ImportedCalibration:
     """Add what a file states in a key; where it names the frames, nothing about them had to be assumed."""
     frames, origin = stated_frames(text), stated_origin(text)
     return replace(
-        found,
-        frames=found.frames or frames,
-        check_point=found.check_point or stated_check_point(text),
-        assumptions=() if frames else found.assumptions,
+        imported,
+        frames=imported.frames or frames,
+        check_point=imported.check_point or stated_check_point(text),
+        assumptions=() if frames else imported.assumptions,
         evidence=origin.evidence,
         calibration_sha256=origin.calibration_sha256,
         for_raw=origin.for_raw,

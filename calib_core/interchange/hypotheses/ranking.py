@@ -261,9 +261,9 @@ def _merged(meanings: Iterable[Meaning]) -> list[Hypothesis]:
     ]
 
 
-def _tested(one: Hypothesis, pairs: CheckPairs | None, against: RigidTransform | None) -> Hypothesis:
+def _tested(hypothesis: Hypothesis, pairs: CheckPairs | None, against: RigidTransform | None) -> Hypothesis:
     """Return a hypothesis with the figures of its tests."""
-    pose, fits = one.camera_from_radar, []
+    pose, fits = hypothesis.camera_from_radar, []
     miss_px, apart = math.nan, (math.nan, math.nan)
     if pairs is not None:
         miss_px = pairs.median_miss_px(pose)
@@ -272,7 +272,7 @@ def _tested(one: Hypothesis, pairs: CheckPairs | None, against: RigidTransform |
         distance_m = float(np.linalg.norm(pose.inverse().translation_m - against.inverse().translation_m))
         apart = rotation_angle_rad(pose.rotation @ against.rotation.T), distance_m
         fits.append(apart[0] <= _NEAR_RAD and apart[1] <= _NEAR_M)
-    return replace(one, miss_px=miss_px, apart=apart, fits=all(fits) if fits else is_usual(pose))
+    return replace(hypothesis, miss_px=miss_px, apart=apart, fits=all(fits) if fits else is_usual(pose))
 
 
 def _by_pairs(hypotheses: Sequence[Hypothesis], pairs: CheckPairs) -> np.ndarray:
@@ -283,8 +283,8 @@ def _by_pairs(hypotheses: Sequence[Hypothesis], pairs: CheckPairs) -> np.ndarray
     return np.asarray(-1.5 * np.log1p((misses_px / sigma_px) ** 2 / 2).sum(axis=1))
 
 
-def _by_distance(one: Hypothesis) -> float:
-    angle, distance_m = one.apart
+def _by_distance(hypothesis: Hypothesis) -> float:
+    angle, distance_m = hypothesis.apart
     return -3.0 * (math.log1p((angle / _ANGLE_RAD) ** 2) + math.log1p((distance_m / _APART_M) ** 2))
 
 

@@ -73,15 +73,15 @@ def _caption(board: Board) -> str:
     return ", ".join([*parts, *([board.dictionary] if board.dictionary else [])])
 
 
-def write_board_views(found: BoardViews) -> str:
+def write_board_views(views: BoardViews) -> str:
     """Write board-views-1 text; the same views give the same bytes."""
     document = BoardViewsDocument(
         BOARD_VIEWS_SCHEMA,
-        found.board,
-        published_source(found.source),
-        found.complete,
-        list(found.searched),
-        [_view_document(view) for view in found.views],
+        views.board,
+        published_source(views.source),
+        views.complete,
+        list(views.searched),
+        [_view_document(view) for view in views.views],
     )
     return document_text(document)
 
@@ -99,11 +99,11 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
     document = parse_document(text, BoardViewsDocument, source=source)
     board = document.board
     images = document.source.images
-    for place, (first, last) in enumerate(document.searched):
+    for index, (first, last) in enumerate(document.searched):
         if not first <= last < images:
-            raise InputError(f"{source}: searched[{place}]: {first} to {last} of {images} images; search again")
+            raise InputError(f"{source}: searched[{index}]: {first} to {last} of {images} images; search again")
     views = tuple(
-        _view(view, board, images, source=source, place=f"views[{place}]") for place, view in enumerate(document.views)
+        _view(view, board, images, source=source, place=f"views[{index}]") for index, view in enumerate(document.views)
     )
     if len({view.index for view in views}) < len(views):
         raise InputError(f"{source}: views: two are of the same image; search again")
@@ -123,7 +123,7 @@ def published_source(source: ImageSource) -> ImageSource:
 
 def published_left_out(left_out: Iterable[LeftOutImage]) -> list[LeftOutImage]:
     """Return images that are not used, with names that are not longer than files may state."""
-    return [structs.replace(one, name=one.name[:_LONGEST_NAME]) for one in left_out]
+    return [structs.replace(image, name=image.name[:_LONGEST_NAME]) for image in left_out]
 
 
 def _view_document(view: BoardCorners) -> BoardViewDocument:

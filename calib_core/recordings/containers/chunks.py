@@ -247,9 +247,9 @@ class ChunkedSource:
                 progress(where.position, self.size_bytes)
             wanted = 0 if where.packed else self.checksum(number)
             found = 0
-            for place in range(0, where.stored_bytes if wanted else 0, _CHECKED_PIECE_BYTES):
-                size = min(_CHECKED_PIECE_BYTES, where.stored_bytes - place)
-                found = zlib.crc32(self.file.up_to(where.position + place, size), found)
+            for index in range(0, where.stored_bytes if wanted else 0, _CHECKED_PIECE_BYTES):
+                size = min(_CHECKED_PIECE_BYTES, where.stored_bytes - index)
+                found = zlib.crc32(self.file.up_to(where.position + index, size), found)
             with self._lock:
                 self._checked[number] = self._checked.get(number, True) and wanted == found
 
@@ -513,8 +513,8 @@ class _Gather:
         self.lengths[order] = lengths
         self.rows.view(f"V{self.size}")[_as_slice(order), 0] = _copy_items(data, offsets - base + lead, self.size)
         fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
-        for place in np.flatnonzero(~usual).tolist():
-            fault = self.single(chunk, int(offsets[place]), int(order[place])) or fault
+        for index in np.flatnonzero(~usual).tolist():
+            fault = self.single(chunk, int(offsets[index]), int(order[index])) or fault
         return fault
 
     def single(self, chunk: int, offset: int, row: int) -> str:

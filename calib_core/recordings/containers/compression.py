@@ -104,10 +104,10 @@ def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
     parts: list[bytes] = []
     left = min(size, MAX_CHUNK_BYTES)
     try:
-        for place in range(0, len(data), _PIECE_BYTES):
+        for index in range(0, len(data), _PIECE_BYTES):
             if unpacker.eof or left <= 0:
                 break
-            parts.append(unpacker.decompress(data[place : place + _PIECE_BYTES], max_length=left))
+            parts.append(unpacker.decompress(data[index : index + _PIECE_BYTES], max_length=left))
             left -= len(parts[-1])
     except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()):
         pass  # keep what was decompressed before the error

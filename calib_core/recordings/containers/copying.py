@@ -299,8 +299,8 @@ def _attachment_head(body: bytes) -> AttachmentHead:
 
 
 def _pieces(source: McapSource, part: Part) -> Iterator[bytes]:
-    for place in range(part.start, part.end, _PIECE_BYTES):
-        yield source.file.up_to(place, min(_PIECE_BYTES, part.end - place))
+    for index in range(part.start, part.end, _PIECE_BYTES):
+        yield source.file.up_to(index, min(_PIECE_BYTES, part.end - index))
 
 
 def sent(source: McapSource, chunk: int, offset: int) -> tuple[int, int]:

@@ -219,9 +219,9 @@ class AppendedFile:
         place: the end of what has been read.
     """
 
-    def __init__(self, file: FileBytes, place: int) -> None:
+    def __init__(self, file: FileBytes, index: int) -> None:
         self._file = file
-        self.move_to(place)
+        self.move_to(index)
 
     def look_again(self) -> bool:
         """Return whether the file has grown beyond what has been read.
@@ -241,9 +241,9 @@ class AppendedFile:
             )
         return self._file.size_bytes > self.place
 
-    def move_to(self, place: int) -> None:
+    def move_to(self, index: int) -> None:
         """Move forward to the end of what has been read now."""
-        self.place = place
+        self.place = index
         self._before = self._last_bytes()
 
     def _last_bytes(self) -> bytes:
@@ -340,9 +340,9 @@ class _Growing(ChunkedSource):
         """Chunks that could not be decompressed, or have the wrong checksum."""
         return damaged_chunks(self.path, self._so_far.damaged_chunks, self._so_far.fault)
 
-    def _indexed(self, place: int) -> int:
+    def _indexed(self, index: int) -> int:
         """Index the messages that were found up to a place; return how many there are."""
-        self._read.move_to(place)
+        self._read.move_to(index)
         found, self._so_far.messages = self._so_far.messages, {}
         for channel, entries in found.items():
             self.indexes[channel] = with_messages(self.index(channel), entries)

@@ -162,8 +162,8 @@ class FileStretch:
 
     def find(self, pattern: "re.Pattern[bytes]", start: int) -> int:
         """Return the offset of the next match of the pattern; -1 if there is none within 1 GiB or before the end."""
-        for place in range(start, min(self.size, start + _MAX_SEARCH_BYTES), _BUFFER_BYTES):
-            block = self._file.up_to(self._start + place, min(_BUFFER_BYTES + _OVERLAP_BYTES, self.size - place))
+        for index in range(start, min(self.size, start + _MAX_SEARCH_BYTES), _BUFFER_BYTES):
+            block = self._file.up_to(self._start + index, min(_BUFFER_BYTES + _OVERLAP_BYTES, self.size - index))
             if found := pattern.search(block):
-                return place + found.start()
+                return index + found.start()
         return -1

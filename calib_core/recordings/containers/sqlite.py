@@ -265,39 +265,39 @@ def _rows_text(low: int, high: int) -> str:
     return f"from {low} on" if high == _NO_END else str(low) if low == high else f"{low} to {high}"
 
 
-def lost_row_warnings(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
+def lost_row_warnings(path: Path, rows: FoundRows, unknown: int) -> list[DataWarning]:
     """Warn about what was lost in a database.
 
     Args:
         path: the file.
-        found: its rows.
+        rows: its rows.
         unknown: number of rows of topics that the file does not describe.
     """
     lost = []
-    if found.fault:
-        where = ", ".join(_rows_text(low, high) for low, high in found.holes[:3])
+    if rows.fault:
+        where = ", ".join(_rows_text(low, high) for low, high in rows.holes[:3])
         lost.append(
-            f"it is damaged or truncated ({found.fault}): {len(found.columns)} messages were recovered; "
+            f"it is damaged or truncated ({rows.fault}): {len(rows.columns)} messages were recovered; "
             + (
-                f"rows {where}{', ...' if len(found.holes) > 3 else ''} are lost"
+                f"rows {where}{', ...' if len(rows.holes) > 3 else ''} are lost"
                 if where
                 else "none are known to be lost"
             )
         )
-    if found.repeated:
+    if rows.repeated:
         lost.append(
-            f"{found.repeated} rows have the number of another row, so others are lost; each number is used once"
+            f"{rows.repeated} rows have the number of another row, so others are lost; each number is used once"
         )
-    if found.missed and not found.holes:
-        lost.append(f"{found.missed} rows that its index of times names are lost")
-    if found.absent and not found.strange:
-        where = ", ".join(_rows_text(low, high) for low, high in found.absent[:3])
-        count = sum(high - low + 1 for low, high in found.absent)
+    if rows.missed and not rows.holes:
+        lost.append(f"{rows.missed} rows that its index of times names are lost")
+    if rows.absent and not rows.strange:
+        where = ", ".join(_rows_text(low, high) for low, high in rows.absent[:3])
+        count = sum(high - low + 1 for low, high in rows.absent)
         lost.append(
-            f"{count} rows are absent ({where}{', ...' if len(found.absent) > 3 else ''}): they were deleted or are lost"
+            f"{count} rows are absent ({where}{', ...' if len(rows.absent) > 3 else ''}): they were deleted or are lost"
         )
-    if found.strange:
-        lost.append(f"{found.strange} rows without a time or a topic are skipped")
+    if rows.strange:
+        lost.append(f"{rows.strange} rows without a time or a topic are skipped")
     if unknown:
         lost.append(f"{unknown} messages belong to topics that the file does not describe, and are skipped")
     if not lost:

@@ -358,7 +358,7 @@ def times_in_names(stems: Sequence[str], zone_s: int | None = None) -> NamedTime
     """
     best: NamedTimes | None = None
     for moments in _candidates(stems):
-        found = [(place, moment) for place, moment in enumerate(moments) if moment is not None]
+        found = [(index, moment) for index, moment in enumerate(moments) if moment is not None]
         if len(found) > (len(best.places) if best else 0):
             best = _stamps_by_name(stems, found, zone_s) or best
     return best

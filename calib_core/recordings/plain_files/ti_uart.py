@@ -297,7 +297,7 @@ class _Scan:
 
     def _note_between(self, stream: "_Stream", begin: int, end: int) -> None:
         """Count the bytes between two packets, unless all of them are zero."""
-        pieces = (stream.up_to(place, min(_PIECE_BYTES, end - place)) for place in range(begin, end, _PIECE_BYTES))
+        pieces = (stream.up_to(index, min(_PIECE_BYTES, end - index)) for index in range(begin, end, _PIECE_BYTES))
         if any(map(any, pieces)):
             self.strange_bytes += end - begin
 

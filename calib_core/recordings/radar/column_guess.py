@@ -370,10 +370,10 @@ def split_unit(written: str) -> tuple[str, str]:
     return (bracketed["name"], bracketed["unit"].strip()) if bracketed else (text, "")
 
 
-def _columns_of_one_position(found: Sequence[ColumnMatch], axes: tuple[str, str, str]) -> dict[str, ColumnMatch]:
+def _columns_of_one_position(matches: Sequence[ColumnMatch], axes: tuple[str, str, str]) -> dict[str, ColumnMatch]:
     """Choose x and y (and z) of one position, not of two."""
     stems: dict[tuple[str, ...], dict[str, ColumnMatch]] = {}
-    for matched in found:
+    for matched in matches:
         if matched.quantity in axes:
             stems.setdefault(matched.stem, {}).setdefault(matched.quantity, matched)
     whole = [group for group in stems.values() if axes[0] in group and axes[1] in group]
@@ -394,8 +394,8 @@ def _assign_vague_angles(vague: Sequence[ColumnMatch], matched: dict[str, Column
     return first, second
 
 
-def _span(one: ColumnMatch) -> float:
-    values = one.column.values[np.isfinite(one.column.values)]
+def _span(match: ColumnMatch) -> float:
+    values = match.column.values[np.isfinite(match.column.values)]
     return float(np.ptp(values)) if len(values) else 0.0
 
 
@@ -519,13 +519,13 @@ class _UnitInference:
         text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
         return units, "assumed", self._unit_assumption("length-unit", text, group, finding.unit, sides)
 
-    def _refuse_either(self, group: Sequence[ColumnMatch], found: "Finding") -> None:
+    def _refuse_either(self, group: Sequence[ColumnMatch], finding: "Finding") -> None:
         """Refuse a table whose values fit two units alike."""
-        if self.of_table and found.rival is not None:
-            maps = (" ".join(_map(one, unit) for one in group) for unit in (found.unit, found.rival))
-            names, why = ", ".join(one.name for one in group), found.why.removesuffix(" cannot be radians")
+        if self.of_table and finding.rival is not None:
+            maps = (" ".join(_map(match, unit) for match in group) for unit in (finding.unit, finding.rival))
+            names, why = ", ".join(match.name for match in group), finding.why.removesuffix(" cannot be radians")
             raise RecordingError(
-                f"the unit of {names} is not stated, and {why} may be {found.unit.name} or {found.rival.name}: "
+                f"the unit of {names} is not stated, and {why} may be {finding.unit.name} or {finding.rival.name}: "
                 f"say which with {' or '.join(maps)}"
             )
 
@@ -834,10 +834,10 @@ def _assume(
     return ColumnAssumption(Assumption(key, "", text, confirm), quantities, axes, angle_unit)
 
 
-def _map(one: ColumnMatch, unit: Unit, quantity: str = "", minus: str = "") -> str:
+def _map(match: ColumnMatch, unit: Unit, quantity: str = "", minus: str = "") -> str:
     """Return the --map that states what a column is, for a shell."""
-    minus = "-" if one.sign < 0 else minus
-    return f"--map {_shell(f'{quantity or one.quantity}={minus}{one.name}{_flag(unit)}')}"
+    minus = "-" if match.sign < 0 else minus
+    return f"--map {_shell(f'{quantity or match.quantity}={minus}{match.name}{_flag(unit)}')}"
 
 
 def _flag(unit: Unit) -> str:
@@ -935,11 +935,11 @@ def _angle_unit(angles: Values, *, integer: bool) -> Finding:
     return Finding(_unit("deg"), False, f"only {why}")
 
 
-def _implausible(angle: ColumnMatch, unit: Unit, found: Finding) -> bool:
+def _implausible(angle: ColumnMatch, unit: Unit, finding: Finding) -> bool:
     """Return whether an angle's values contradict its stated unit."""
     values = angle.column.values[np.isfinite(angle.column.values)]
     too_wide = float(np.abs(values).max(initial=0.0)) * unit.scale > 2 * np.pi + 0.01
-    return too_wide or (found.certain and unit.name in ("rad", "deg") and unit.name != found.unit.name)
+    return too_wide or (finding.certain and unit.name in ("rad", "deg") and unit.name != finding.unit.name)
 
 
 def _speed_unit(speeds: Values, *, integer: bool) -> Finding:

@@ -401,7 +401,7 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     Raises:
         OptionError: the position is incomplete, or a time is mapped.
     """
-    given = {one.quantity: one for one in column_map}
+    given = {column.quantity: column for column in column_map}
     if "time" in given:
         raise OptionError(
             f"--map {given['time'].words}: messages carry their time in their headers; choose the clock with --clock"
@@ -419,9 +419,9 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     )
     return replace(
         made,
-        mapped=tuple(one.words for one in column_map),
+        mapped=tuple(column.words for column in column_map),
         assumptions=(*kept, *assumed),
-        readings=(*readings, *(_reading(one) for one in column_map)),
+        readings=(*readings, *(_reading(column) for column in column_map)),
     )
 
 
@@ -430,21 +430,23 @@ def _is_replaced(reading: ColumnReading, made: ColumnPlan) -> bool:
     return reading.quantity in gone or (reading.quantity == "velocity" and not made.velocity)
 
 
-def _is_settled(one: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
-    unit = one.assumption.key.endswith("-unit")
-    if set(one.quantities) & set(_CARTESIAN if made.polar else _POLAR):
+def _is_settled(assumption: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
+    unit = assumption.assumption.key.endswith("-unit")
+    if set(assumption.quantities) & set(_CARTESIAN if made.polar else _POLAR):
         return True  # about columns that are no longer read
-    return bool(one.quantities) and all(q in given and (given[q].unit or not unit) for q in one.quantities)
+    return bool(assumption.quantities) and all(
+        q in given and (given[q].unit or not unit) for q in assumption.quantities
+    )
 
 
-def _reading(one: MappedColumn) -> ColumnReading:
-    sign = _SIDES.get(one.quantity, "")
+def _reading(column: MappedColumn) -> ColumnReading:
+    sign = _SIDES.get(column.quantity, "")
     return ColumnReading(
-        one.quantity,
-        one.column,
-        one.unit or "as before",
-        f"opposite of {sign}" if sign and one.sign < 0 else sign,
-        f"--map {one.words}",
+        column.quantity,
+        column.column,
+        column.unit or "as before",
+        f"opposite of {sign}" if sign and column.sign < 0 else sign,
+        f"--map {column.words}",
     )
 
 
@@ -507,16 +509,16 @@ def _scales(plan: ColumnPlan) -> tuple[float, float, float]:
     return plan.scales[0], factor * plan.scales[1], factor * plan.scales[2]
 
 
-def _unit_assumption(one: MappedColumn) -> ColumnAssumption:
-    unit = next(iter(MAPPED_UNITS[one.quantity]))
+def _unit_assumption(column: MappedColumn) -> ColumnAssumption:
+    unit = next(iter(MAPPED_UNITS[column.quantity]))
     return ColumnAssumption(
         Assumption(
-            _KEYS[one.quantity],
+            _KEYS[column.quantity],
             "",
-            f"{one.column} is taken as {unit}; --map {one.words} does not state the unit",
-            f"--map {one.words}:{unit}",
+            f"{column.column} is taken as {unit}; --map {column.words} does not state the unit",
+            f"--map {column.words}:{unit}",
         ),
-        (one.quantity,),
+        (column.quantity,),
     )
 
 
@@ -540,9 +542,9 @@ def _speed(
 
 def _sigma(made: ColumnPlan, given: Mapping[str, MappedColumn]) -> ColumnPlan:
     sigma, scales = list(made.sigma), list(made.sigma_scales)
-    for place, quantity in enumerate(_POLAR):
+    for index, quantity in enumerate(_POLAR):
         one = given.get(f"sigma_{quantity}")
         if one is not None:
-            sigma[place] = one.column
-            scales[place] = abs(one.scale) / (math.pi / 180.0 if place and made.degrees else 1.0)
+            sigma[index] = one.column
+            scales[index] = abs(one.scale) / (math.pi / 180.0 if index and made.degrees else 1.0)
     return replace(made, sigma=(sigma[0], sigma[1], sigma[2]), sigma_scales=(scales[0], scales[1], scales[2]))

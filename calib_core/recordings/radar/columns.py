@@ -229,9 +229,9 @@ def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Poin
 
 def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n: int) -> Points3:
     found = np.full((n, 3), np.nan)
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         if name is not None:
-            found[:, place] = column(name).reshape(-1)
+            found[:, index] = column(name).reshape(-1)
     return found
 
 

@@ -221,16 +221,16 @@ def _renumbered(scans: RadarScans) -> RadarScans:
     return replace(scans, alternative_of=np.where(real, numbers, -1))
 
 
-def matches(one: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool = True) -> tuple[Indices, Indices]:
+def matches(scans: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool = True) -> tuple[Indices, Indices]:
     """Find the returns of the same scan that are each other's nearest within the spread: their rows in both.
 
     Args:
-        one: scans.
+        scans: scans.
         other: the scans of the same moments.
         spread: how far apart two reports of one return may lie.
         azimuth: whether the directions must agree too.
     """
-    mine, theirs = _sortable(one), _sortable(other)
+    mine, theirs = _sortable(scans), _sortable(other)
     order = np.argsort(theirs, kind="stable")
     keys = theirs[order]
     low = np.searchsorted(keys, mine - spread.step[0], side="left")
@@ -238,7 +238,7 @@ def matches(one: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool
     counts = np.where(np.isfinite(mine), high - low, 0)
     a = np.repeat(np.arange(len(mine)), counts)
     b = order[np.repeat(low - np.cumsum(counts) + counts, counts) + np.arange(len(a))]
-    apart, inside = _squared_distances(one, other, a, b, spread, azimuth=azimuth)
+    apart, inside = _squared_distances(scans, other, a, b, spread, azimuth=azimuth)
     a, b, apart = a[inside], b[inside], apart[inside]
     nearest = _best(a, apart) & _best(b, apart)
     return a[nearest], b[nearest]
@@ -251,20 +251,20 @@ def _sortable(scans: RadarScans) -> Values:
 
 
 def _squared_distances(
-    one: RadarScans, other: RadarScans, a: Indices, b: Indices, spread: Spread, *, azimuth: bool
+    scans: RadarScans, other: RadarScans, a: Indices, b: Indices, spread: Spread, *, azimuth: bool
 ) -> tuple[Values, Flags]:
     """Return the squared distances (k,) of rows, in spreads, and which are within; unknown speeds agree with all."""
     cosines = (
-        np.abs(direction_cosines(one.points_radar_m[a]) - direction_cosines(other.points_radar_m[b])) / spread.step
+        np.abs(direction_cosines(scans.points_radar_m[a]) - direction_cosines(other.points_radar_m[b])) / spread.step
     )
-    speed = np.abs(one.doppler_mps[a] - other.doppler_mps[b]) / spread.doppler_mps
+    speed = np.abs(scans.doppler_mps[a] - other.doppler_mps[b]) / spread.doppler_mps
     inside = ~(speed > 1.0)
     apart = cosines[:, 0] ** 2 + np.where(np.isfinite(speed), speed, 0.0) ** 2
     if azimuth:
         inside &= (cosines[:, 1:] <= 1.0).all(axis=1)
         return apart + (cosines[:, 1:] ** 2).sum(axis=1), inside
-    louder = (one.snr_db[a] - other.snr_db[b]) / _SNR_DB
-    rows = (a - one.first_return[one.scan_of_return()[a]]) - (b - other.first_return[other.scan_of_return()[b]])
+    louder = (scans.snr_db[a] - other.snr_db[b]) / _SNR_DB
+    rows = (a - scans.first_return[scans.scan_of_return()[a]]) - (b - other.first_return[other.scan_of_return()[b]])
     return apart + np.where(np.isfinite(louder), louder, 0.0) ** 2 + _PER_ROW * rows**2, inside
 
 
@@ -298,9 +298,9 @@ class MergedStream(ScanBlocks):
     def other_azimuths(self) -> tuple[str, ...]:
         """The topics, or the columns of a topic, that hold other azimuths of the returns of another topic."""
         found = []
-        for place, part in enumerate(self.parts):
+        for index, part in enumerate(self.parts):
             column = part.layout.plan.azimuth_from
-            if self._repeats[place] != place:
+            if self._repeats[index] != index:
                 found.append(part.topic.name if column is None else f"{column} of {part.topic.name}")
         return tuple(found)
 

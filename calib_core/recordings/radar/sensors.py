@@ -173,12 +173,12 @@ def _sensor(
         group, key=lambda i: (-round(topics[i].figures.returns_per_scan), len(topics[i].name), topics[i].name)
     )
     repeats: list[int] = []
-    for place, i in enumerate(order):
-        first = [k for k in range(place) if repeats[k] == k and related[_pair(order[k], i)] == "alternatives"]
-        repeats.append(first[0] if first else place)
+    for index, i in enumerate(order):
+        first = [k for k in range(index) if repeats[k] == k and related[_pair(order[k], i)] == "alternatives"]
+        repeats.append(first[0] if first else index)
     names = tuple(topics[i].name for i in order)
     copies = tuple(topics[j].name for j, i in copy_of.items() if i in group)
-    own = [topics[i].figures for place, i in enumerate(order) if repeats[place] == place]
+    own = [topics[i].figures for index, i in enumerate(order) if repeats[index] == index]
     return RadarSensor(sensor_name(names), names, tuple(repeats), copies, topics[order[0]].frame, _all_together(own))
 
 
@@ -216,26 +216,28 @@ def _all_together(figures: Sequence[Figures]) -> Figures:
     )
 
 
-def relation(one: Examined, other: Examined) -> Relation:
+def relation(examined: Examined, other: Examined) -> Relation:
     """Judge how two topics belong together."""
-    elsewhere = _words(one.name, _PLACE_WORDS) != _words(other.name, _PLACE_WORDS)
-    unnamed = one.frame != other.frame and not (one.frame and other.frame)
-    if (one.frame != other.frame and not unnamed) or elsewhere or not (one.returns and other.returns):
+    elsewhere = _words(examined.name, _PLACE_WORDS) != _words(other.name, _PLACE_WORDS)
+    unnamed = examined.frame != other.frame and not (examined.frame and other.frame)
+    if (examined.frame != other.frame and not unnamed) or elsewhere or not (examined.returns and other.returns):
         return "apart"
-    stamped = one.stamped == other.stamped
+    stamped = examined.stamped == other.stamped
     times = (
-        [one.stream.times_ns, other.stream.times_ns] if stamped else [one.stream.receive_ns, other.stream.receive_ns]
+        [examined.stream.times_ns, other.stream.times_ns]
+        if stamped
+        else [examined.stream.receive_ns, other.stream.receive_ns]
     )
     alternating = not unnamed and alternate(*times)
-    both = _common_moments((one.stream, other.stream), times)
+    both = _common_moments((examined.stream, other.stream), times)
     if both is None:
         return "ranges" if alternating else "apart"
-    spreads = one.spread, other.spread
+    spreads = examined.spread, other.spread
     spread = Spread(np.hypot(spreads[0].step, spreads[1].step), max(spread.doppler_mps for spread in spreads))
     first, second = both
     fewer = min(_count(first), _count(second))
     if alternating:
-        return "apart" if _are_turned(one, other, first, second, spread) else "ranges"
+        return "apart" if _are_turned(examined, other, first, second, spread) else "ranges"
     if fewer < _FEWEST:
         return "apart"
     if len(matches(first, second, spread)[0]) >= _SAME_SHARE * fewer:
@@ -244,7 +246,7 @@ def relation(one: Examined, other: Examined) -> Relation:
         return "apart"
     if _are_alternatives(first, second, spread, fewer):
         return "alternatives"
-    return "ranges" if _are_ranges(one, other, first, second, spread) else "apart"
+    return "ranges" if _are_ranges(examined, other, first, second, spread) else "apart"
 
 
 def alternate(times: TimesNs, others: TimesNs) -> bool:
@@ -326,44 +328,44 @@ def _shifted(scans: RadarScans, spread: Spread) -> RadarScans:
     return RadarScans(scans.times_ns, scans.first_return, points, scans.doppler_mps, scans.snr_db, scans.sigma_polar)
 
 
-def _are_ranges(one: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
+def _are_ranges(examined: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
     """Return whether two topics are near and far scans of one radar: they agree where both see, or are named so."""
-    named = _words(one.name, _RANGE_WORDS) != _words(other.name, _RANGE_WORDS)
-    complementary = _reach_differs(one.figures, other.figures)
+    named = _words(examined.name, _RANGE_WORDS) != _words(other.name, _RANGE_WORDS)
+    complementary = _reach_differs(examined.figures, other.figures)
     if not (named or complementary):
         return False
-    common = [_in_common(scans, one.figures, other.figures) for scans in (first, second)]
+    common = [_in_common(scans, examined.figures, other.figures) for scans in (first, second)]
     if min(map(_count, common)) < _FEWEST:
         return named and complementary
     agree = _agreement(common[0], common[1], spread)
     return agree >= _AGREE or (agree > _CONTRADICT and named and complementary)
 
 
-def _are_turned(one: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
+def _are_turned(examined: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
     """Return whether two topics show the same ranges in other directions, as radars of two mountings do."""
-    near, far = (_in_common(scans, one.figures, other.figures) for scans in (first, second))
+    near, far = (_in_common(scans, examined.figures, other.figures) for scans in (first, second))
     if min(_count(near), _count(far)) < _FEWEST:
         return False
     return _agreement(near, far, spread) < _CHANCE and _agreement(near, far, spread, azimuth=False) >= _AGREE
 
 
-def _agreement(one: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool = True) -> float:
+def _agreement(scans: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool = True) -> float:
     """Return the share of the returns that two topics report alike, beyond chance."""
-    by_chance = len(matches(one, _shifted(other, spread), spread, azimuth=azimuth)[0])
-    return (len(matches(one, other, spread, azimuth=azimuth)[0]) - by_chance) / min(_count(one), _count(other))
+    by_chance = len(matches(scans, _shifted(other, spread), spread, azimuth=azimuth)[0])
+    return (len(matches(scans, other, spread, azimuth=azimuth)[0]) - by_chance) / min(_count(scans), _count(other))
 
 
-def _reach_differs(one: Figures, other: Figures) -> bool:
+def _reach_differs(figures: Figures, other: Figures) -> bool:
     """Return whether one radar reaches much farther than the other, or begins where the other ends."""
-    far = sorted((one.farthest_m, other.farthest_m))
-    near = sorted((one.nearest_m, other.nearest_m))
+    far = sorted((figures.farthest_m, other.farthest_m))
+    near = sorted((figures.nearest_m, other.nearest_m))
     return far[1] > _FARTHER * far[0] or (near[1] > _FARTHER * near[0] and far[0] < far[1])
 
 
-def _in_common(scans: RadarScans, one: Figures, other: Figures) -> RadarScans:
+def _in_common(scans: RadarScans, figures: Figures, other: Figures) -> RadarScans:
     """Keep the returns at ranges that both topics show."""
     range_m = np.linalg.norm(scans.points_radar_m, axis=1)
-    low, high = max(one.nearest_m, other.nearest_m), min(one.farthest_m, other.farthest_m)
+    low, high = max(figures.nearest_m, other.nearest_m), min(figures.farthest_m, other.farthest_m)
     return scans.take(np.flatnonzero((range_m >= low) & (range_m <= high)))
 
 

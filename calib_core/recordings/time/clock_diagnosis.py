@@ -173,14 +173,14 @@ def between_islands(steps_s: Values) -> np.ndarray:
     return steps_s > max(_ISLAND_S, _GAP_PERIODS * float(np.median(steps_s)))
 
 
-def _with_rhythm(found: ClockDiagnosis, times_ns: TimesNs) -> ClockDiagnosis:
+def _with_rhythm(diagnosis: ClockDiagnosis, times_ns: TimesNs) -> ClockDiagnosis:
     if len(times_ns) < 2:
-        return found
+        return diagnosis
     steps_s = np.diff(times_ns) / NS_PER_S
     period_s = float(np.median(steps_s))
     apart = between_islands(steps_s)
     return replace(
-        found,
+        diagnosis,
         period_s=period_s,
         gaps=int(np.count_nonzero(steps_s > _GAP_PERIODS * period_s)) if period_s > 0 else 0,
         longest_gap_s=float(steps_s.max()),
@@ -189,11 +189,11 @@ def _with_rhythm(found: ClockDiagnosis, times_ns: TimesNs) -> ClockDiagnosis:
     )
 
 
-def _with_order(found: ClockDiagnosis, header_ns: TimesNs) -> ClockDiagnosis:
+def _with_order(diagnosis: ClockDiagnosis, header_ns: TimesNs) -> ClockDiagnosis:
     dated = header_ns[header_ns != 0]
     steps_ns = np.diff(dated)
     return replace(
-        found,
+        diagnosis,
         zero_stamps=len(header_ns) - len(dated),
         from_1970=bool(len(dated)) and bool(np.median(dated) < YEAR_2000_NS),
         repeated_stamps=int(np.count_nonzero(steps_ns == 0)),
@@ -230,10 +230,10 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
     )
 
 
-def clock_warnings(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
+def clock_warnings(diagnosises: Sequence[ClockDiagnosis]) -> list[DataWarning]:
     """Warn about clock problems that can degrade a calibration."""
     warnings = []
-    for clock in found:
+    for clock in diagnosises:
         by_stamps = clock.chosen == "header"
         if by_stamps and clock.jumps:
             warnings.append(
@@ -253,7 +253,7 @@ def clock_warnings(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                     "synchronise the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )
-    apart = [one for one in found if one.islands > 1 and not one.is_assumed]
+    apart = [one for one in diagnosises if one.islands > 1 and not one.is_assumed]
     if apart:
         listed = "; ".join(
             f"{one.topic} has {one.islands} stretches of data separated by up to {span_text(one.longest_gap_s)}: "

@@ -98,16 +98,16 @@ def reflector_facets(
     return facets
 
 
-def _sheet(apex: Vector3, one: Vector3, two: Vector3, level: float, eye: Vector3) -> list[Facet]:
+def _sheet(apex: Vector3, vector3: Vector3, two: Vector3, level: float, eye: Vector3) -> list[Facet]:
     """Build a triangular sheet with a gradient from apex to rim and a bright cut edge."""
-    triangle = np.array([np.zeros(3), one, two])
-    if float(np.cross(one, two) @ (eye - apex)) < 0.0:  # seen from behind: the painted back
+    triangle = np.array([np.zeros(3), vector3, two])
+    if float(np.cross(vector3, two) @ (eye - apex)) < 0.0:  # seen from behind: the painted back
         return [Facet(subdivided(apex + triangle), 0.22 * _ALUMINIUM)]
     facets = []
     for share in np.linspace(1.0, 0.14, 9):  # nested triangles: darker into the corner
         gradient = 0.70 + 0.30 * share
         facets.append(Facet(subdivided(apex + share * triangle), level * gradient * _ALUMINIUM))
-    rim = apex + np.array([one, two, 0.955 * two, 0.955 * one])
+    rim = apex + np.array([vector3, two, 0.955 * two, 0.955 * vector3])
     return [*facets, Facet(subdivided(rim), (0.35 + 0.65 * level) * _RIM)]
 
 

@@ -94,7 +94,7 @@ def read_contents(folder: GuardedFolder, facts: RecordingFacts | None = None) ->
     return _merged_contents(journal, copy, recordings[0], facts)
 
 
-def rewrite(folder: GuardedFolder, found: Contents) -> tuple[str, ...]:
+def rewrite(folder: GuardedFolder, contents: Contents) -> tuple[str, ...]:
     """Write a journal and its copy again from what was proven; a process killed on the way leaves files that agree.
 
     Returns:
@@ -106,7 +106,7 @@ def rewrite(folder: GuardedFolder, found: Contents) -> tuple[str, ...]:
     """
     backups = tuple(kept for name in (JOURNAL, COPY) if (kept := folder.back_up(name)) is not None)
     for name in (JOURNAL, COPY):
-        folder.replace(name, bytes_of(found.lines))
+        folder.replace(name, bytes_of(contents.lines))
     return backups
 
 
@@ -154,13 +154,13 @@ def _merged_contents(
     )
 
 
-def _faults(found: FoundJournal | None, where: str) -> tuple[str, ...]:
+def _faults(journal: FoundJournal | None, where: str) -> tuple[str, ...]:
     """Return what is wrong with a file, one phrase each."""
-    if found is None:
+    if journal is None:
         return ()
-    faults = [f"{where}{fault}" for fault in found.faults]
-    if doubtful := found.doubtful:
-        faults.append(f"{where}line {doubtful[0] + 2} is damaged ({found.why(doubtful[0])})")
+    faults = [f"{where}{fault}" for fault in journal.faults]
+    if doubtful := journal.doubtful:
+        faults.append(f"{where}line {doubtful[0] + 2} is damaged ({journal.why(doubtful[0])})")
     if len(doubtful) > 1:
         faults.append(f"{where}{len(doubtful) - 1} lines after it do not follow from what is before it")
     return tuple(faults)
@@ -258,15 +258,15 @@ def _contents(folder: GuardedFolder) -> Contents:
     return contents
 
 
-def _repair(folder: Path, found: Contents, backups: tuple[str, ...] = ()) -> Repair:
+def _repair(folder: Path, contents: Contents, backups: tuple[str, ...] = ()) -> Repair:
     return Repair(
         folder=folder,
-        recording=found.recording.name,
-        clicks=found.history.present.clicks,
-        steps=len(found.steps),
-        faults=found.faults,
-        is_complete=found.is_complete,
-        unproven=0 if found.is_complete else found.left_out,
-        torn_bytes=found.torn_bytes,
+        recording=contents.recording.name,
+        clicks=contents.history.present.clicks,
+        steps=len(contents.steps),
+        faults=contents.faults,
+        is_complete=contents.is_complete,
+        unproven=0 if contents.is_complete else contents.left_out,
+        torn_bytes=contents.torn_bytes,
         backups=backups,
     )

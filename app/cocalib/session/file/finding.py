@@ -251,11 +251,11 @@ def session_summaries(places: Sequence[Path]) -> tuple[SessionSummary, ...]:
     return tuple(_summary(folder) for folder in dict.fromkeys(folder.absolute() for folder in folders))
 
 
-def _folders(place: Path) -> tuple[Path, ...]:
-    if holds_session_files(place):
-        return (place,)
-    inside = _session_folders_in(place, set_aside=True)
-    named = recording_session_folder([place]) if place.exists() else place
+def _folders(path: Path) -> tuple[Path, ...]:
+    if holds_session_files(path):
+        return (path,)
+    inside = _session_folders_in(path, set_aside=True)
+    named = recording_session_folder([path]) if path.exists() else path
     return (*inside, named) if named.is_dir() and named not in inside else inside
 
 

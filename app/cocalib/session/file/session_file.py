@@ -231,28 +231,28 @@ def _open_folder(
     return opened
 
 
-def _restored_warnings(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tuple[DataWarning, ...]:
+def _restored_warnings(contents: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tuple[DataWarning, ...]:
     """Return what the user must know about the session before continuing.
 
     Raises:
         SessionFileError: the files disagree in a way that a person must decide.
     """
-    if not found.is_complete:
+    if not contents.is_complete:
         raise SessionFileError(
-            f"{folder.path}: the session is damaged: {'; '.join(found.faults)}; nothing was changed. "
+            f"{folder.path}: the session is damaged: {'; '.join(contents.faults)}; nothing was changed. "
             f"See what can be kept: cocalib session repair {folder.path}"
         )
-    faults = _fault_warnings(found) if found.faults else ()
-    if all(isinstance(step, AxesStated) for step in found.steps):
+    faults = _fault_warnings(contents) if contents.faults else ()
+    if all(isinstance(step, AxesStated) for step in contents.steps):
         return faults
-    return (*faults, *_axes_warnings(found.radar_axes, facts.radar_axes))
+    return (*faults, *_axes_warnings(contents.radar_axes, facts.radar_axes))
 
 
-def _fault_warnings(found: Contents) -> tuple[DataWarning, ...]:
-    clicks = len(found.history.present.clicks)
+def _fault_warnings(contents: Contents) -> tuple[DataWarning, ...]:
+    clicks = len(contents.history.present.clicks)
     message = (
-        f"the session was damaged: {'; '.join(found.faults)}; it continues with the {clicks} clicks in the journal and its copy; "
-        "as far as the files show, none is missing"
+        f"the session was damaged: {'; '.join(contents.faults)}; it continues with the {clicks} clicks in the journal and its "
+        "copy; as far as the files show, none is missing"
     )
     hint = "the damaged files are kept next to the new ones, with .backup-1 or the next number in their names"
     return (DataWarning.reported("session-damaged", message, hint),)

@@ -512,8 +512,8 @@ def _membership(before: Sequence[str], after: Sequence[str]) -> tuple[list[int],
     if not staying or len(old) < len(before) or len(new) < len(after):
         return list(range(len(before))), list(range(len(after)))
     return (
-        [place for place, name in enumerate(before) if name not in new],
-        [place for place, name in enumerate(after) if name not in old],
+        [index for index, name in enumerate(before) if name not in new],
+        [index for index, name in enumerate(after) if name not in old],
     )
 
 

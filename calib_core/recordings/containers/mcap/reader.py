@@ -178,8 +178,8 @@ class McapSource(ChunkedSource):
         end = self.size_bytes - len(MAGIC) - 4
         wanted = int.from_bytes(self.file.up_to(end, 4), "little")
         found = 0
-        for place in range(start, end if wanted else start, _PIECE_BYTES):
-            found = zlib.crc32(self.file.up_to(place, min(_PIECE_BYTES, end - place)), found)
+        for index in range(start, end if wanted else start, _PIECE_BYTES):
+            found = zlib.crc32(self.file.up_to(index, min(_PIECE_BYTES, end - index)), found)
         return found == wanted
 
     def _read_chunk_index(self, info: ChunkInfo) -> None:

@@ -207,11 +207,11 @@ def string_at(data: bytes, place: int) -> tuple[str, int]:
     return found.decode("utf-8", "replace"), place
 
 
-def _bytes_at(data: bytes, place: int) -> tuple[bytes, int]:
-    length = struct.unpack_from("<I", data, place)[0]
-    if place + 4 + length > len(data):
+def _bytes_at(data: bytes, index: int) -> tuple[bytes, int]:
+    length = struct.unpack_from("<I", data, index)[0]
+    if index + 4 + length > len(data):
         raise struct.error("string extends past its record")
-    return data[place + 4 : place + 4 + length], place + 4 + length
+    return data[index + 4 : index + 4 + length], index + 4 + length
 
 
 def _mapping(data: bytes) -> ChannelNotes:

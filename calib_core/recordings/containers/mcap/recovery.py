@@ -82,50 +82,50 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
     return mcap
 
 
-def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:
+def parts_of_mcap(file: FileBytes, mcap: FoundInMcap) -> Iterator[Part]:
     """Walk through the data section, and note what is in it; stop before the summary.
 
     Args:
         file: the file.
-        found: takes messages, declarations and losses inside chunks.
+        mcap: takes messages, declarations and losses inside chunks.
     """
     stretch = FileStretch(file, 0, file.size_bytes)
     place = len(MAGIC)
-    while place + RECORD.size <= stretch.size and not found.ended:
+    while place + RECORD.size <= stretch.size and not mcap.ended:
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         start = place + RECORD.size
         whole = size <= stretch.size - start
         part = Part(kind, place, start, start + size)
         if kind == CHUNK and (head := chunk_head(stretch.up_to(start, 64))) and _sound(head):
             room = min(head.stored_bytes, stretch.size - start - head.size)
-            _scan_chunk(file, start + head.size, room, head, found)
+            _scan_chunk(file, start + head.size, room, head, mcap)
             part = replace(part, start=start + head.size, end=start + head.size + room)
-        elif whole and _END_SIZES.get(kind) == size and not _data_after(stretch, start + size, found):
-            found.ended = True
+        elif whole and _END_SIZES.get(kind) == size and not _data_after(stretch, start + size, mcap):
+            mcap.ended = True
             if kind == FOOTER:
                 return
-        elif not (whole and (kind in DATA_KINDS or kind >= PRIVATE) and _note(stretch, kind, start, size, found)):
-            part = Part(0, place, place, _following(stretch, place + 1, found))
+        elif not (whole and (kind in DATA_KINDS or kind >= PRIVATE) and _note(stretch, kind, start, size, mcap)):
+            part = Part(0, place, place, _following(stretch, place + 1, mcap))
         yield part
         place = part.end
-    if not found.ended and place < stretch.size:
+    if not mcap.ended and place < stretch.size:
         yield Part(0, place, place, stretch.size)
 
 
-def scan_mcap_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
+def scan_mcap_further(file: FileBytes, place: int, mcap: FoundInMcap) -> int:
     """Scan the complete records of a file that is being written; return the position of the first incomplete one.
 
     Args:
         file: the file.
         place: position of the first record to read.
-        found: receives what is found.
+        mcap: receives what is found.
 
     Raises:
         RecordingError: there is no record at a position.
     """
-    found.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "")
+    mcap.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "")
     stretch = FileStretch(file, 0, file.size_bytes)
-    while place + RECORD.size <= stretch.size and not found.ended:
+    while place + RECORD.size <= stretch.size and not mcap.ended:
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         start = place + RECORD.size
         if kind == size == 0:
@@ -136,15 +136,15 @@ def scan_mcap_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
             break
         head = chunk_head(stretch.up_to(start, 64)) if kind == CHUNK else None
         if head is not None and _sound(head):
-            _scan_chunk(file, start + head.size, min(head.stored_bytes, size - head.size), head, found)
+            _scan_chunk(file, start + head.size, min(head.stored_bytes, size - head.size), head, mcap)
         elif kind != CHUNK and not (kind == MESSAGE and size > MAX_RECORD_BYTES):
-            found.ended = kind in _END_SIZES
-            _note(stretch, kind, start, size, found)
+            mcap.ended = kind in _END_SIZES
+            _note(stretch, kind, start, size, mcap)
         place = start + size
     return place
 
 
-def _data_after(stretch: Stretch, place: int, found: FoundInMcap) -> bool:
+def _data_after(stretch: Stretch, place: int, mcap: FoundInMcap) -> bool:
     """Return whether messages follow a place where only the summary should, which may be damaged."""
     for kind, start, size in walk(stretch, place):
         if kind not in SUMMARY_KINDS:
@@ -152,11 +152,11 @@ def _data_after(stretch: Stretch, place: int, found: FoundInMcap) -> bool:
         place = start + size
     if place + len(MAGIC) >= stretch.size:
         return False
-    after = _following(stretch, place, found)
+    after = _following(stretch, place, mcap)
     while after < stretch.size:
         if stretch.up_to(after, 1)[0] in (CHUNK, MESSAGE):
             return True
-        after = _following(stretch, after + 1, found)
+        after = _following(stretch, after + 1, mcap)
     return False
 
 
@@ -164,7 +164,7 @@ def _sound(head: ChunkHead) -> bool:
     return head.compression in _COMPRESSIONS and (bool(head.compression) or head.stored_bytes == head.unpacked_bytes)
 
 
-def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap, chunk: int = 0) -> bool:
+def _note(stretch: Stretch, kind: int, start: int, size: int, mcap: FoundInMcap, chunk: int = 0) -> bool:
     """Record a message, a schema or a channel; False if it is damaged."""
     if kind == MESSAGE:
         if not MESSAGE_HEAD.size <= size <= MAX_RECORD_BYTES:
@@ -172,21 +172,21 @@ def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap
         channel, _, log_time, _ = MESSAGE_HEAD.unpack(stretch.up_to(start, MESSAGE_HEAD.size))
         if log_time >= 1 << 63:
             return False
-        found.messages.setdefault(channel, []).append((log_time, chunk, start - RECORD.size))
+        mcap.messages.setdefault(channel, []).append((log_time, chunk, start - RECORD.size))
     elif kind in (SCHEMA, CHANNEL):
-        return size <= MAX_RECORD_BYTES and found.declarations.note(kind, stretch.up_to(start, size))
+        return size <= MAX_RECORD_BYTES and mcap.declarations.note(kind, stretch.up_to(start, size))
     elif kind >= PRIVATE:
-        found.private_bytes += RECORD.size + size
+        mcap.private_bytes += RECORD.size + size
     return True
 
 
-def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
+def _following(stretch: Stretch, start: int, mcap: FoundInMcap) -> int:
     """Return the offset of the next plausible record that is followed by another; the end if there is none."""
-    while found.tried < _MAX_TRIES:
+    while mcap.tried < _MAX_TRIES:
         place = stretch.find(_CANDIDATE, start)
         if place < 0:
             break
-        found.tried += 1
+        mcap.tried += 1
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         after = place + RECORD.size + size
         if kind == CHUNK:
@@ -199,25 +199,25 @@ def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
     return stretch.size
 
 
-def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, found: FoundInMcap) -> None:
+def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, mcap: FoundInMcap) -> None:
     """Record all complete messages of a chunk, even if it is truncated or damaged."""
-    number = len(found.chunks)
+    number = len(mcap.chunks)
     size = stored
     stretch: Stretch = FileStretch(file, position, stored)
     if head.compression:
         packed = Chunk(position, stored, head.unpacked_bytes, head.compression)
-        stretch = MemoryStretch(found.unpacked(file, packed, where=f"chunk at byte {position}", checksum=head.checksum))
+        stretch = MemoryStretch(mcap.unpacked(file, packed, where=f"chunk at byte {position}", checksum=head.checksum))
         size = stretch.size
-    found.chunks.append(Chunk(position, stored, size, head.compression))
+    mcap.chunks.append(Chunk(position, stored, size, head.compression))
     end = 0
     while end + RECORD.size <= size:
         for kind, start, length in walk(stretch, end):
-            if kind not in CHUNK_KINDS or not _note(stretch, kind, start, length, found, number):
+            if kind not in CHUNK_KINDS or not _note(stretch, kind, start, length, mcap, number):
                 break
             end = start + length
         if end + RECORD.size > size:
             break
-        after = _following(stretch, end + 1, found)
-        found.lost_bytes += after - end
+        after = _following(stretch, end + 1, mcap)
+        mcap.lost_bytes += after - end
         end = after
-    found.lost_bytes += max(0, size - end)
+    mcap.lost_bytes += max(0, size - end)

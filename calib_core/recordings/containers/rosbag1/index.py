@@ -221,14 +221,14 @@ def damaged(file: FileBytes, position: int) -> RecordingError:
     )
 
 
-def record_head(stretch: Stretch, place: int, file: FileBytes, origin: int) -> tuple[bytes, int]:
+def record_head(stretch: Stretch, index: int, file: FileBytes, origin: int) -> tuple[bytes, int]:
     """Return a record's header and the size of its data."""
-    head = stretch.up_to(place, _HEAD_BYTES)
+    head = stretch.up_to(index, _HEAD_BYTES)
     length = _U32.unpack_from(head)[0] if len(head) >= 4 else _MAX_HEADER_BYTES
     if length + 8 > len(head) and length < _MAX_HEADER_BYTES:
-        head = stretch.up_to(place, length + 8)
+        head = stretch.up_to(index, length + 8)
     if length + 8 > len(head):
-        raise damaged(file, origin + place)
+        raise damaged(file, origin + index)
     return head[4 : 4 + length], _U32.unpack_from(head, 4 + length)[0]
 
 

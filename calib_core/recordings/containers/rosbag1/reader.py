@@ -177,9 +177,9 @@ class Rosbag1Source(ChunkedSource):
         return usual, words[:, 1].astype(np.int64)
 
 
-def channels_of(found: FoundInBag) -> dict[int, Channel]:
+def channels_of(bag: FoundInBag) -> dict[int, Channel]:
     """Return the channels that a scan has found, by number."""
-    channels = (channel_of(fields, data) for fields, data in found.connections.values())
+    channels = (channel_of(fields, data) for fields, data in bag.connections.values())
     return {channel.id: channel for channel in channels if channel is not None}
 
 

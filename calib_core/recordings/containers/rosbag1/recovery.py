@@ -50,20 +50,20 @@ class FoundInBag(Scanned):
     connections: dict[int, tuple[dict[str, bytes], bytes]] = field(default_factory=dict)
 
 
-def _record(stretch: Stretch, place: int) -> Record | None:
+def _record(stretch: Stretch, index: int) -> Record | None:
     """Read the record at a place; None if there is none."""
-    head = stretch.up_to(place, 512)
+    head = stretch.up_to(index, 512)
     if len(head) < 8:
         return None
     length = _U32.unpack_from(head)[0]
-    if length > min(_MAX_HEADER_BYTES, stretch.size - place - 8):
+    if length > min(_MAX_HEADER_BYTES, stretch.size - index - 8):
         return None
     if length + 8 > len(head):
-        head = stretch.up_to(place, length + 8)
+        head = stretch.up_to(index, length + 8)
     fields = fields_of(head[4 : 4 + length]) if len(head) >= length + 8 else None
     if not fields or len(fields.get("op", b"")) != 1:
         return None
-    return Record(fields, fields["op"][0], place, place + 8 + length, _U32.unpack_from(head, 4 + length)[0])
+    return Record(fields, fields["op"][0], index, index + 8 + length, _U32.unpack_from(head, 4 + length)[0])
 
 
 class BagWalk:
@@ -75,9 +75,9 @@ class BagWalk:
         inside: whether this is inside a chunk, which cannot contain chunks.
     """
 
-    def __init__(self, stretch: Stretch, found: FoundInBag, *, inside: bool) -> None:
+    def __init__(self, stretch: Stretch, bag: FoundInBag, *, inside: bool) -> None:
         self._stretch = stretch
-        self._found = found
+        self._found = bag
         self._kinds = (_MESSAGE, _CONNECTION) if inside else (_MESSAGE, _CONNECTION, _CHUNK)
 
     def records(self, place: int) -> Iterator[Record]:
@@ -103,8 +103,8 @@ class BagWalk:
             if mark < 0:
                 return None
             self._found.tried += 1
-            for place in range(mark - 8, max(start - 1, mark - _BACK_BYTES), -1):
-                record = _record(self._stretch, place)
+            for index in range(mark - 8, max(start - 1, mark - _BACK_BYTES), -1):
+                record = _record(self._stretch, index)
                 if record is not None and record.kind in self._kinds:
                     return record
             start = mark + 1
@@ -128,7 +128,7 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
     return bag
 
 
-def scan_bag_further(file: FileBytes, place: int, found: FoundInBag) -> int:
+def scan_bag_further(file: FileBytes, place: int, bag: FoundInBag) -> int:
     """Scan the complete records of a bag that is being written; return the position of the first incomplete one.
 
     A recorder writes the header of a chunk with a size of 0 and replaces it once the chunk is complete.
@@ -136,12 +136,12 @@ def scan_bag_further(file: FileBytes, place: int, found: FoundInBag) -> int:
     Args:
         file: the bag.
         place: position of the first record to read.
-        found: receives what is found.
+        bag: receives what is found.
 
     Raises:
         RecordingError: there is no record at a position.
     """
-    found.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "none")
+    bag.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "none")
     stretch = FileStretch(file, 0, file.size_bytes)
     while place + 8 <= stretch.size:
         record = _record(stretch, place)
@@ -152,53 +152,53 @@ def scan_bag_further(file: FileBytes, place: int, found: FoundInBag) -> int:
         if record.end > stretch.size or (record.kind == _CHUNK and not record.data_size):
             break
         if record.kind == _CHUNK:
-            scan_chunk(file, record, found)
+            scan_chunk(file, record, bag)
         elif record.kind not in _OTHER_KINDS:
-            note_record(stretch, record, 0, found)
+            note_record(stretch, record, 0, bag)
         place = record.end
     return place
 
 
-def _may_be_incomplete(stretch: Stretch, place: int) -> bool:
+def _may_be_incomplete(stretch: Stretch, index: int) -> bool:
     """Return whether the header of a record ends beyond the file, or is space that has not been filled yet."""
-    length = _U32.unpack(stretch.up_to(place, 4))[0]
-    return length == 0 or stretch.size - place - 8 < length <= _MAX_HEADER_BYTES
+    length = _U32.unpack(stretch.up_to(index, 4))[0]
+    return length == 0 or stretch.size - index - 8 < length <= _MAX_HEADER_BYTES
 
 
-def scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
+def scan_chunk(file: FileBytes, record: Record, bag: FoundInBag) -> None:
     """Record all complete messages of a chunk; in a damaged compressed chunk, those before the damage."""
     stored = min(record.data_size, file.size_bytes - record.data_place)
     compression = record.fields.get("compression", b"").decode("utf-8", "replace")
     size = int.from_bytes(record.fields.get("size", b""), "little")
-    number = len(found.chunks)
+    number = len(bag.chunks)
     if compression in ("none", ""):
         stretch: Stretch = FileStretch(file, record.data_place, stored)
         size = stored
     else:
         packed = Chunk(record.data_place, stored, size, compression)
-        data = found.unpacked(file, packed, where=f"chunk at byte {record.place}")
+        data = bag.unpacked(file, packed, where=f"chunk at byte {record.place}")
         stretch, size = MemoryStretch(data), len(data)
-    found.chunks.append(Chunk(record.data_place, stored, size, compression))
-    for inner in BagWalk(stretch, found, inside=True).records(0):
-        if not note_record(stretch, inner, number, found):
-            found.lost_bytes += inner.end - inner.place
+    bag.chunks.append(Chunk(record.data_place, stored, size, compression))
+    for inner in BagWalk(stretch, bag, inside=True).records(0):
+        if not note_record(stretch, inner, number, bag):
+            bag.lost_bytes += inner.end - inner.place
 
 
-def note_record(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> bool:
+def note_record(stretch: Stretch, record: Record, chunk: int, bag: FoundInBag) -> bool:
     """Record a message or a connection; False if it is neither, or damaged."""
     if record.kind == _CONNECTION:
-        return _note_connection(record, stretch.up_to(record.data_place, record.data_size), found)
+        return _note_connection(record, stretch.up_to(record.data_place, record.data_size), bag)
     fields = record.fields
     if record.kind != _MESSAGE or len(fields.get("time", b"")) != 8 or len(fields.get("conn", b"")) != 4:
         return False
     sec, nanosec = struct.unpack("<II", fields["time"])
     connection = int.from_bytes(fields["conn"], "little")
-    found.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
+    bag.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
     return True
 
 
-def _note_connection(record: Record, data: bytes, found: FoundInBag) -> bool:
+def _note_connection(record: Record, data: bytes, bag: FoundInBag) -> bool:
     if len(record.fields.get("conn", b"")) != 4:
         return False
-    found.connections.setdefault(int.from_bytes(record.fields["conn"], "little"), (record.fields, data))
+    bag.connections.setdefault(int.from_bytes(record.fields["conn"], "little"), (record.fields, data))
     return True

@@ -243,12 +243,12 @@ def radar_columns(table: Table, options: PlainOptions) -> RadarColumns:
     )
     taken = {one.column for one in stated.column_map}
     wanted = tuple(
-        place
-        for place, name in enumerate(names)
+        index
+        for index, name in enumerate(names)
         if name in taken
         or _numbers_returns(name)
-        or (_last_word(name) in VALID and "".join(table.first_row[place : place + 1]).strip().lower() in _FLAGS)
-        or ((time is None or name != time.column) and table_meaning(name, units[place]) is not None)
+        or (_last_word(name) in VALID and "".join(table.first_row[index : index + 1]).strip().lower() in _FLAGS)
+        or ((time is None or name != time.column) and table_meaning(name, units[index]) is not None)
     )
     try:
         times = choose_times(names, units, table.first_row, time, taken)
@@ -258,20 +258,20 @@ def radar_columns(table: Table, options: PlainOptions) -> RadarColumns:
     return RadarColumns(names, units, stated, times, wanted, plan)
 
 
-def _spelt(path: Path, names: Sequence[str], one: MappedColumn) -> str:
+def _spelt(path: Path, names: Sequence[str], column: MappedColumn) -> str:
     """Return a mapped column as the table spells it.
 
     Raises:
         RecordingError: there is none of this name.
     """
     bare = [name.strip("#% ") for name in names]
-    for wanted, known in ((one.column, bare), (one.column.lower(), [name.lower() for name in bare])):
+    for wanted, known in ((column.column, bare), (column.column.lower(), [name.lower() for name in bare])):
         if wanted in known:
             return names[known.index(wanted)]
-    near = get_close_matches(one.column, bare, 1, 0.0)
+    near = get_close_matches(column.column, bare, 1, 0.0)
     hint = f"; did you mean '{near[0]}'? " if near else "; "
     raise RecordingError(
-        f"{path}: --map {one.words}: no column '{one.column}'{hint}The columns are {_column_list(bare)}"
+        f"{path}: --map {column.words}: no column '{column.column}'{hint}The columns are {_column_list(bare)}"
     )
 
 
@@ -445,8 +445,8 @@ def _table_words(columns: RadarColumns, remarks: tuple[str, ...]) -> str:
     used = {*plan.columns, *(name for name in plan.claimed if name)}
     unused = [
         name
-        for place, name in enumerate(columns.names)
-        if name and name not in used and place not in columns.times.places
+        for index, name in enumerate(columns.names)
+        if name and name not in used and index not in columns.times.places
     ]
     more = len(unused) - _MOST_NAMES
     left = (

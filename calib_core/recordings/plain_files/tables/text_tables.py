@@ -175,17 +175,17 @@ def _cells(line: str, separator: str) -> tuple[str, ...]:
 def _header_place(lines: Sequence[str]) -> tuple[int | None, str]:
     """Return the line and the separator with the most names of quantities; None if no line has two of them."""
     best: tuple[int, int | None, str] = (1, None, ",")
-    for place, line in enumerate(lines[:_HEADER_LINES]):
+    for index, line in enumerate(lines[:_HEADER_LINES]):
         bare = _COMMENT.sub("", line, count=1) if _COMMENT.match(line) else line
         for separator in _SEPARATORS:
             if separator not in bare:
                 continue
             known = sum(1 for cell in _cells(bare, separator) if cell and is_known(cell))
             if known > best[0]:
-                best = known, place, separator
+                best = known, index, separator
     if best[1] is not None:
         return best[1], best[2]
-    first = next((place for place, line in enumerate(lines) if _is_row(line)), None)
+    first = next((index for index, line in enumerate(lines) if _is_row(line)), None)
     if first is None or _looks_numeric(lines[first]):
         return None, ","
     return first, max(",;\t|", key=lines[first].count)
@@ -197,7 +197,7 @@ def _looks_numeric(line: str) -> bool:
 
 
 def _headless(path: Path, encoding: str, lines: Sequence[str]) -> TextTable:
-    first = next((place for place, line in enumerate(lines) if _is_row(line)), None)
+    first = next((index for index, line in enumerate(lines) if _is_row(line)), None)
     if first is None:
         raise RecordingError(
             f"{path}: the file is empty; the first line must name columns and units, such as {TABLE_EXAMPLE}"
@@ -254,10 +254,10 @@ def first_rows(table: TextTable) -> list[list[str]]:
         return [row for row in islice(rows, _SAMPLED_ROWS) if _is_data(row)]
 
 
-def read_cells(table: TextTable, place: int) -> list[str]:
+def read_cells(table: TextTable, index: int) -> list[str]:
     """Return the cells of one column, "" where a row is too short."""
     with table.rows() as rows:
-        return [row[place].strip() if place < len(row) else "" for row in rows if _is_data(row)]
+        return [row[index].strip() if index < len(row) else "" for row in rows if _is_data(row)]
 
 
 def _is_data(row: Sequence[str]) -> bool:

@@ -137,17 +137,17 @@ def choose_times(
         return TimeColumns((TimeColumn(names.index(mapped.column), mapped.column, "time", mapped.unit, 0, True),))
     claims: dict[str, list[TimeColumn]] = {}
     foreign: list[tuple[str, str]] = []
-    for place, written in enumerate(names):
+    for index, written in enumerate(names):
         name = None if written in taken else time_name(written)
         if name is None:
             continue
-        below = units[place].strip("[]() -") if place < len(units) else ""
+        below = units[index].strip("[]() -") if index < len(units) else ""
         unit = unit_of_word(name.unit or below)
         if unit is None and name.quantity == "time" and (name.unit or below):
             foreign.append((written, name.unit or below))
             continue
         flag = unit.flag if unit and unit.dimension == "time" and name.quantity == "time" else ""
-        claims.setdefault(name.quantity, []).append(TimeColumn(place, written.strip(), name.quantity, flag, name.rank))
+        claims.setdefault(name.quantity, []).append(TimeColumn(index, written.strip(), name.quantity, flag, name.rank))
     time = _time_columns(claims, first_row)
     if not time and foreign:
         raise unknown_unit_error(foreign[0][0], "time", foreign[0][1])

@@ -155,11 +155,11 @@ def _no_values(name: str) -> np.ndarray:
     return np.zeros(0)
 
 
-def _known_snr(found: Returns) -> Returns:
+def _known_snr(returns: Returns) -> Returns:
     """Replace zero intensities by NaN: the stock driver never fills them in."""
-    if found.snr_db.flags.writeable:
-        found.snr_db[found.snr_db == 0.0] = np.nan
-    return found
+    if returns.snr_db.flags.writeable:
+        returns.snr_db[returns.snr_db == 0.0] = np.nan
+    return returns
 
 
 def first_of_scans(
