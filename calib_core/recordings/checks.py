@@ -288,15 +288,7 @@ def radar_frame_warnings(name: str, frame: str) -> list[DataWarning]:
     """
     if frame.lower().rpartition("/")[2] not in _VEHICLE_FRAMES:
         return []
-    return [
-        DataWarning.reported(
-            "radar-in-vehicle-frame",
-            f"{name} is in the frame '{frame}', by its name a vehicle's: the pose would be that of this frame, and its "
-            "uncertainty is too small, since the radar's noise and angle errors are about the radar's own place and axes",
-            "record the returns in the radar's own frame, before the driver or converter moves them; if they are in it and only "
-            "the name is wrong, no action is needed",
-        )
-    ]
+    return [DataWarning("radar-in-vehicle-frame", {"topic": name, "frame": frame})]
 
 
 def image_warnings(images: ImageStream | None) -> list[DataWarning]:

@@ -339,6 +339,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "shared-error-suspected",
         "clock-bias-suspected",
         "radar-axes-suspected",
+        "radar-in-vehicle-frame",
         "repeated-placements",
     ),
     "limited": (

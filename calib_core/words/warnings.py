@@ -744,6 +744,20 @@ def lost_returns(*, lost: int, read: int, where: str) -> Remark:
     )
 
 
+def radar_in_vehicle_frame(*, topic: str, frame: str) -> Remark:
+    """Given when the frame_id of the returns is a vehicle's, such as base_link: they seem to have been moved out of the radar's
+    own frame.
+
+    Could also be: returns in the radar's frame under another's name.
+    """
+    return remark(
+        f"{topic} is in the frame '{frame}', by its name a vehicle's: the pose would be that of this frame, and its uncertainty "
+        "is too small, since the radar's noise and angle errors are about the radar's own place and axes",
+        "record the returns in the radar's own frame, before the driver or converter moves them; if only the name is wrong, "
+        "correct the frame_id",
+    )
+
+
 def choices_unused(*, clicks: int) -> Remark:
     """Given when Algorithm 1 only: a return was chosen for a click, which it does not use: it averages all static returns
     of a window.
@@ -814,6 +828,7 @@ SOLVER = by_code(
     pixels_suspected,
     placement_ranges,
     radar_axes_suspected,
+    radar_in_vehicle_frame,
     repeated_placements,
     residuals_too_large,
     shared_error_suspected,

@@ -131,3 +131,4 @@ def test_returns_that_a_driver_has_moved_into_the_vehicles_frame_are_named(cocal
     assert "radar-in-vehicle-frame" in cocalib("info", *bags).out
     answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", tmp_path / "c.json")
     assert "'base_link'" in answer.err
+    assert "verdict: coarse" in answer.out

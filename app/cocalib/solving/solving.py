@@ -37,7 +37,8 @@ _MOST_CANDIDATES = 50
 _MOST_LOST = 0.05
 """Share of the returns."""
 
-_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns", "damaged-recording")
+_VEHICLE_FRAME = "radar-in-vehicle-frame"
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns", "damaged-recording", _VEHICLE_FRAME)
 """What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
@@ -93,10 +94,10 @@ def solve_in_steps(
         yield Unsolvable("no-camera")
         return
     scans = scans_around(recording, clicks, options)
-    lost_message_warnings = _lost_return_warnings(recording, clicks, options)
+    of_recording = _of_recording(recording, clicks, options)
     for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
-        if lost_message_warnings and isinstance(outcome, Calibration):
-            outcome = dataclasses.replace(outcome, warnings=(*lost_message_warnings, *outcome.warnings))
+        if of_recording and isinstance(outcome, Calibration):
+            outcome = dataclasses.replace(outcome, warnings=(*of_recording, *outcome.warnings))
         yield _with_damage(outcome, recording) if isinstance(recording, Recording) else outcome
 
 
@@ -111,12 +112,19 @@ def _with_damage(outcome: Calibration | Unsolvable, recording: Recording) -> Cal
     return dataclasses.replace(outcome, warnings=(warning, *outcome.warnings))
 
 
-def _lost_return_warnings(
+def _of_recording(
     recording: RadarSource, clicks: Sequence[ReflectorClick], options: CalibrationOptions
 ) -> tuple[DataWarning, ...]:
-    """Warn if returns around the clicks are lost, or more than 5 % of those read so far."""
+    """Warn if returns are in a vehicle's frame, or lost: around the clicks, or more than 5 % of those read so far."""
     if not isinstance(recording, Recording):
         return ()
+    moved = (warning for warning in recording.warnings if warning.code == _VEHICLE_FRAME)
+    return (*moved, *_lost_returns(recording, clicks, options))
+
+
+def _lost_returns(
+    recording: Recording, clicks: Sequence[ReflectorClick], options: CalibrationOptions
+) -> tuple[DataWarning, ...]:
     near = recording.losses([click.image_time for click in clicks], half_window_s(options))
     if near.lost:
         return (lost_returns(near.lost, near.read, "the radar around the clicks"),)
