@@ -26,7 +26,7 @@ from calib_core.results.systematic_errors import systematic_error_warnings
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
-_NOTABLE_GROWTH = 2.5
+_NOTABLE_GROWTH = 3.0
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers", "doubtful-pair")
@@ -99,7 +99,7 @@ def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
     by_fit = {
         error.name: variance**0.5 for error, variance in zip(shared.estimated, variances, strict=True) if error.of_radar
     }
-    if fit.uncertainty.growth == 1.0:  # smooth errors of the radar would pass for these
+    if not fit.uncertainty.shows_smooth:  # smooth errors of the radar would pass for these
         by_fit |= {error.name: error.sigma for error in errors if error.name.startswith(("click_", "range_scale"))}
     return systematic_error_warnings(
         errors, by_fit, flat=fit.measurements.flat, measured=fit.measurements.prior.measured
@@ -125,7 +125,8 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
-    if fit.uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
+    uncertainty = fit.uncertainty
+    if not uncertainty.shows_smooth or uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
         return []
     uncertain_lens = fit.measurements.camera.covariance is not None and not fit.options.refining.intrinsics
     return [DataWarning("smooth-angle-errors", {"growth": fit.uncertainty.growth, "uncertain_lens": uncertain_lens})]

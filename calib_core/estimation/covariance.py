@@ -41,6 +41,7 @@ class PoseCovariance:
         quantile: the factor on the covariance that gives the 95 % ellipsoid.
         condition: condition number of the information of the pairs alone, after scaling each unknown.
         growth: factor by which smooth angle errors of the radar widen the rotation's standard deviation; 1 without them.
+        shows_smooth: whether the residuals themselves speak for smooth angle errors, not only what is known of radars.
         parts: what of the covariance rests on stated standard deviations.
         systematic_errors: what each of them contributes.
         lens: (r, r) covariance of refined intrinsics along the axes of their prior; None if they were not refined.
@@ -51,6 +52,7 @@ class PoseCovariance:
     quantile: float
     condition: float
     growth: float
+    shows_smooth: bool
     parts: CovarianceParts
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
     lens: np.ndarray | None = None
@@ -88,7 +90,7 @@ def pose_covariance(
     information = _floored(plain, lost)
     prior_information = priors.T @ priors
     independent = symmetric_inverse(information)
-    spread = pose_spread(refined, plain) if smooth else None
+    spread, shows_smooth = (smooth_spread(refined, plain) if smooth else None) or (None, False)
     covariance = independent if spread is None else _widened(independent, plain, spread)
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
     shared = _shared_errors(refined, plain, covariance)
@@ -107,6 +109,7 @@ def pose_covariance(
         quantile=_quantile(refined.degrees_of_freedom, min(max(from_pairs, 0.0), 1.0)),
         condition=_scaled_condition(plain - prior_information),
         growth=growth,
+        shows_smooth=shows_smooth,
         parts=_parts(refined, plain, assumed),
         systematic_errors=_shares(shared.found, pose),
         lens=shared.lens,
@@ -333,11 +336,14 @@ _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
 _INDEPENDENT_LOG_ODDS = 3.0  # prior log-odds of purely independent errors against each single split
+_EVEN_LOG_ODDS = 4.5  # at which independent errors are about as probable as all splits together
+_SHOWN = 3.0 / 7.0  # odds of any split, at even ones, from which residuals show smooth errors
 _NEGLIGIBLE = 1e-10
 
 
-def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.ndarray | None:
-    """Return the covariance (6 + k, 6 + k) of the least-squares pose and systematic errors under smooth angle errors.
+def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tuple[np.ndarray, bool] | None:
+    """Return the covariance (6 + k, 6 + k) of the least-squares pose and systematic errors under smooth angle errors, and
+    whether the residuals show them.
 
     None if there are too few pairs. Every split of the noise into independent and smooth parts is weighted by its probability:
     what the pose absorbs of a smooth error no residual shows, so quiet residuals must not rule it out.
@@ -363,9 +369,10 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
         middles.append(parts[:, 0] * (jacobian.T @ jacobian) + parts[:, 1] * (shared.T @ shared))
     probability = np.exp(np.concatenate(likelihoods) - np.concatenate(likelihoods).max())
     probability /= probability.sum()
+    shown = probability[1:].sum() > _SHOWN * np.exp(_EVEN_LOG_ODDS - _INDEPENDENT_LOG_ODDS) * probability[0]
     middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
-    return np.asarray(inverse @ middle @ inverse)
+    return np.asarray(inverse @ middle @ inverse), bool(shown)
 
 
 def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Values, np.ndarray]:

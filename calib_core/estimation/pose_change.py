@@ -42,6 +42,7 @@ _OWNERS: Mapping[str, "Owner"] = {
     "elevation_scale": "radar",
     "range_bias_m": "radar",
     "range_scale": "radar",
+    "elevation_lean": "radar",
     "squared_height_m2": "session",
     "reflector_right_m": "person",
     "reflector_down_m": "person",
@@ -230,7 +231,9 @@ class _Equations:
         gradients = (np.swapaxes(jacobian, 1, 2) @ fit.model.residual[:, :, None])[:, :, 0]
         values = np.concatenate([np.zeros(6), errors.values, np.zeros(len(errors.widening))])
         root = np.sqrt(weights)[:, None]
-        wider = pose_covariance(fit, radar).covariance - pose_covariance(fit, radar, smooth=False).covariance
+        stated, wider = pose_covariance(fit, radar), np.zeros((6, 6))
+        if stated.shows_smooth:  # otherwise the array's smooth errors are as likely the same in both sets
+            wider = stated.covariance - pose_covariance(fit, radar, smooth=False).covariance
         if fit.measurements.flat:
             moves = mounting_moves(fit.camera_from_radar, fit.placements_z_m, radar)
             wider = wider + moves @ moves.T

@@ -56,6 +56,12 @@ class PairTable:
             InputError: a number is not finite, a position is at the radar, or ids repeat.
         """
         assumed = tuple(one.text for one in self.assumptions)
+        missing = np.flatnonzero(np.isnan(self.points_radar_m).all(axis=1))
+        if missing.size:
+            where = f"{source}: points_radar_m[{missing[0]}]"
+            raise InputError(
+                f"{where}: is no position, or at the radar's origin, which cannot be a return; remove the pair"
+            )
         try:
             pairs = pairs_from_arrays(self.points_radar_m, self.pixels_px, noise=noise, ids=self.ids)
         except InputError as error:

@@ -65,10 +65,9 @@ def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions)
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_good_data_with_a_tape_measure_give_no_warning(noise):
-    for seed in range(4):
-        simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise)
-        assert codes(simulated.pairs, simulated.camera, measured()) == set()
+def test_of_twelve_good_sets_with_a_tape_measure_at_most_one_has_a_warning(noise):
+    sets = [simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise) for seed in range(12)]
+    assert sum(bool(codes(simulated.pairs, simulated.camera, measured())) for simulated in sets) <= 1
 
 
 @pytest.mark.parametrize("axes", [(1, -1, 1), (1, 1, -1)])

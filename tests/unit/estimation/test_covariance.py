@@ -36,7 +36,7 @@ def test_pixel_covariance_is_that_of_projections_under_drawn_poses():
     calibration = solved(simulated, EXACT)
     points = np.array([[8.0, 1.0, 0.2], [4.0, -1.0, -0.5]])
     rng = np.random.default_rng(1)
-    drawn = rng.multivariate_normal(np.zeros(6), calibration.covariance, 1500)
+    drawn = rng.multivariate_normal(np.zeros(6), calibration.covariance, 6000)
     pixels = np.array([calibration.camera.project(calibration.camera_from_radar.perturbed(d) @ points) for d in drawn])
     for k in range(2):
         assert np.cov(pixels[:, k].T) == pytest.approx(calibration.pixel_covariance(points)[k], rel=0.25, abs=0.3)
