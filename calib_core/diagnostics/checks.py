@@ -26,7 +26,7 @@ from calib_core.results.systematic_errors import systematic_error_warnings
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
-_NOTABLE_GROWTH = 3.0
+_NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers", "doubtful-pair")

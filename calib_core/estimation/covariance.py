@@ -335,9 +335,10 @@ _INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
 _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
-_INDEPENDENT_LOG_ODDS = 3.0  # prior log-odds of purely independent errors against each single split
-_EVEN_LOG_ODDS = 4.5  # at which independent errors are about as probable as all splits together
-_SHOWN = 3.0 / 7.0  # odds of any split, at even ones, from which residuals show smooth errors
+_INDEPENDENT_LOG_ODDS = (
+    4.5  # prior log-odds of purely independent errors against each single split: about even against all
+)
+_SHOWN = 0.3  # probability of smooth errors from which residuals show them
 _NEGLIGIBLE = 1e-10
 
 
@@ -369,10 +370,9 @@ def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tup
         middles.append(parts[:, 0] * (jacobian.T @ jacobian) + parts[:, 1] * (shared.T @ shared))
     probability = np.exp(np.concatenate(likelihoods) - np.concatenate(likelihoods).max())
     probability /= probability.sum()
-    shown = probability[1:].sum() > _SHOWN * np.exp(_EVEN_LOG_ODDS - _INDEPENDENT_LOG_ODDS) * probability[0]
     middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
-    return np.asarray(inverse @ middle @ inverse), bool(shown)
+    return np.asarray(inverse @ middle @ inverse), bool(probability[0] < 1.0 - _SHOWN)
 
 
 def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Values, np.ndarray]:
