@@ -81,9 +81,9 @@ def held_from() -> int:
 def images(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Iterator[Images]:
     fake = Images(truth, held_from)
     monkeypatch.setattr("cocalib.proposing.dwell_views", fake)
-    monkeypatch.setattr("cocalib.proposing.looks_of", lambda clicks, *_: [object()] if clicks else [])
+    monkeypatch.setattr("cocalib.proposing.appearances_of", lambda clicks, *_: [object()] if clicks else [])
     monkeypatch.setattr(
-        "cocalib.proposing.with_look",
+        "cocalib.proposing.with_appearance",
         lambda views, *_: tuple(
             replace(view, candidates=tuple(replace(one, likeness=0.5) for one in view.candidates)) for view in views
         ),

@@ -289,7 +289,7 @@ def test_errors_are_as_large_as_the_options_state():
 
 
 def test_exact_instruments_draw_no_errors():
-    radar, lens = RadarOptions(0.0, 0.0, 0.0, 0.0), LensOptions(0.0, 0.0, 0.0)
+    radar, lens = RadarOptions(0.0, 0.0, 0.0, 0.0, 0.0), LensOptions(0.0, 0.0, 0.0)
     drawn = draw_systematic_errors(
         np.random.default_rng(5), radar=radar, lens=lens, reflector=ReflectorOptions(0.0, 0.0)
     )
