@@ -143,8 +143,8 @@ class SessionLaws(RuleBasedStateMachine):
     def undo_then_redo_changes_nothing(self) -> None:
         before = self.workspace.history
         if before.past:
-            self.workspace.undo()
-            self.workspace.redo()
+            self.workspace.dispatch(Undo())
+            self.workspace.dispatch(Redo())
         after = self.workspace.history
         assert kept_of(after.present) == kept_of(before.present)
         assert after.present.is_solved == before.present.is_solved

@@ -34,7 +34,7 @@ _HTML, _PDF = (".html", ".htm"), (".pdf",)
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), returns in boxes (Acc); or write a report.
+    """Evaluate a calibration on a recording: mean reprojection error (AED), share of returns in boxes (Acc); or a report.
 
     A report needs no recording: it states the accuracy of the calibration, where in the image, and the evidence.
     """

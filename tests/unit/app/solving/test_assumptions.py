@@ -11,7 +11,7 @@ import pytest
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
-from cocalib.session.events import AssumptionsConfirmed, ColumnsMapped
+from cocalib.session.events import AssumptionsConfirmed, ColumnsMapped, Undo
 from cocalib.session.file.finding import remembered_map
 from cocalib.solving.solving import GivenPairs, calibration_text, calibration_text_of_pairs, solve_pairs
 from cocalib.workspace import Workspace, open_workspace
@@ -67,7 +67,7 @@ def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(record
     file = read_calibration(calibration_text(calibration, recording, workspace.session.confirmed))
     assert [one.confirmed for one in file.provenance.assumptions] == [True, True]
     assert "assumed" not in [warning.code for warning in file.calibration.warnings]
-    workspace.undo()
+    workspace.dispatch(Undo())
     assert workspace.view.assumptions == (), "undo is about clicks and options"
     workspace.close()
 
@@ -92,7 +92,7 @@ def test_the_map_is_remembered_for_the_next_opening(paths, tmp_path):
         assert recording.assumptions == ()
         workspace = workspace_of(recording, tmp_path)
         workspace.dispatch(ColumnsMapped(recording.column_map))
-        workspace.undo()
+        workspace.dispatch(Undo())
         assert workspace.session.column_map == STATED
         workspace.close()
     assert remembered_map(tmp_path) == STATED
