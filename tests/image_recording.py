@@ -43,6 +43,7 @@ class ImageRecording:
     assumptions: tuple[Any, ...] = ()
     stated_assumptions: tuple[Any, ...] = ()
     column_map: tuple[str, ...] = ()
+    radar_clock_notes: tuple[str, ...] = ()
     radar_columns: tuple[Any, ...] = ()
     radar_notes: tuple[str, ...] = ()
     image_names: tuple[str, ...] = ()

@@ -70,7 +70,7 @@ def test_the_command_line_says_the_same_as_the_page(calibration):
     assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
         map(str, systematic_errors(calibration).sentences)
     )
-    assert " ".join(lines).casefold().count("a tape-measured camera position") == 1
+    assert " ".join(lines).casefold().count("placements at several heights") == 1
     assert any(line.startswith("in the image") for line in lines)
     assert assumed_figures(calibration) == ()
 
