@@ -30,7 +30,7 @@ from calib_core.measurements import (
     ReflectorClick,
     TimeNs,
 )
-from calib_core.options import CalibrationOptions, GatingOptions, LocatingOptions, NoiseOptions
+from calib_core.options import CalibrationOptions, GatingOptions, LocatingOptions, NoiseOptions, PaperOptions
 from calib_core.results import Calibration
 from tests.scans import scan_of
 
@@ -178,13 +178,14 @@ def test_guesses_do_not_make_up_the_four_pairs_that_a_pose_needs(windows):
     assert len(outcome.pairs) == len(clicks)
 
 
-def test_algorithm_1_says_that_it_does_not_use_a_choice(windows):
-    paper = CalibrationOptions(method="paper")
+@pytest.mark.parametrize(("region_m", "code"), [(1.0, "placement-ranges"), (0.0, "choices-unused")])
+def test_algorithm_1_says_whether_it_uses_a_choice(windows, region_m, code):
+    paper = CalibrationOptions(method="paper", paper=PaperOptions(region_m=region_m))
     free = pair_clicks(windows.clicks, windows.scans, OPTIONS).pairs
     chosen = replace(windows.clicks[0], chosen=ChosenReturn(position(free[0], 0)))
     outcome = calibrate([chosen, *windows.clicks[1:]], windows.scans, windows.rig.camera, paper)
     if isinstance(outcome, Calibration):
-        assert outcome.warnings[-1].code == "choices-unused"
+        assert outcome.warnings[-1].code == code
 
 
 def test_without_clicks_there_is_nothing_to_pair():

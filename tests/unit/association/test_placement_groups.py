@@ -15,12 +15,12 @@ from calib_core.association.placements import find_placements
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.interchange.own.calibration_json import calibration_text
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScan, RadarScans, ReflectorClick, TimeNs
-from calib_core.options import CalibrationOptions, GatingOptions
+from calib_core.options import CalibrationOptions, GatingOptions, RadarOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from tests.scans import scan_of
 
-OPTIONS = CalibrationOptions()
+OPTIONS = CalibrationOptions(radar=RadarOptions(elevation_lean_sigma=0.0))  # as the simulated radars
 
 
 def repeated(simulated: SimulatedPairs, clicks: int, rng: np.random.Generator, *, timed: bool = False) -> list[Pair]:
