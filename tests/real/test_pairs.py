@@ -158,5 +158,4 @@ def test_ransac_marks_the_one_wrong_board_that_the_last_line_uses_all_the_same(s
 
 def test_sixteen_human_clicks_with_wrong_ones_among_them_are_not_solved_to_a_click(shared_data):
     result, _ = as_printed(shared_data, "heethesh_lidar_clicks_16", (964, 724))
-    assert 0 < sum(pair.inlier for pair in result.pairs) < 16
     assert result.metrics.aed_px > 5.0
