@@ -12,7 +12,7 @@ from calib_core.radar import direction_cosines
 from calib_core.synthetic.radar_returns import RADAR_PROFILES, Targets, measure
 from calib_core.synthetic.rendering.surfaces import line_coverage
 from calib_core.synthetic.scene.person import PersonState, capsules
-from calib_core.synthetic.timeline import draw_islands, draw_times
+from calib_core.synthetic.timeline import draw_segments, draw_times
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -104,16 +104,16 @@ def test_a_pixel_is_never_covered_by_less_than_nothing_or_more_than_all(at, peri
 @given(seed=seeds, steps_s=st.lists(st.floats(4.0, 40.0), min_size=1, max_size=8))
 def test_islands_keep_the_order_of_time_and_leave_minutes_between(seed, steps_s):
     middles_s = np.cumsum(steps_s)
-    islands = draw_islands(np.random.default_rng(seed), middles_s)
+    segments = draw_segments(np.random.default_rng(seed), middles_s)
     times_s = np.arange(0.0, middles_s[-1] + 20.0, 0.05)
-    kept = times_s[islands.recorded(times_s)]
-    recorded_s = kept + islands.delay_s(kept)
+    kept = times_s[segments.recorded(times_s)]
+    recorded_s = kept + segments.delay_s(kept)
     steps = np.diff(recorded_s)
-    assert islands.recorded(middles_s).all()
+    assert segments.recorded(middles_s).all()
     assert (steps > 0.0).all()
     assert (steps[steps > 1.0] >= 60.0 - 1e-6).all()
     assert (steps > 1.0).sum() == len(middles_s) - 1
     for start_s, end_s in zip(middles_s - 1.0, middles_s + 1.0, strict=True):
-        first_s, last_s = islands.first_after_s(float(start_s)), islands.last_before_s(float(end_s))
+        first_s, last_s = segments.first_after_s(float(start_s)), segments.last_before_s(float(end_s))
         middle_s = 0.5 * (start_s + end_s)
-        assert first_s <= middle_s + float(islands.delay_s(np.array([middle_s]))[0]) <= last_s
+        assert first_s <= middle_s + float(segments.delay_s(np.array([middle_s]))[0]) <= last_s
