@@ -23,7 +23,7 @@ from calib_core.measurements import MIN_PAIRS, Candidate, Pair, Unpaired
 from calib_core.options import CalibrationOptions, without_systematic_errors
 from calib_core.radar import RadarErrors, polar_from_cartesian
 from calib_core.results import Calibration
-from calib_core.results.calibration import CHI2_95_2, CHI2_95_6
+from calib_core.results.calibration import CHI2_95_2, CHI2_95_6, CHI2_999_2
 from calib_core.results.metrics import aed, metrics_of
 
 _FOLDS = 5
@@ -210,7 +210,7 @@ def _distance_px(pair: Pair, calibration: Calibration) -> float:
     return float(away_px[0] if len(away_px) == 1 or np.isnan(away_px).all() else np.nanmin(away_px))
 
 
-_MISFIT = 13.815510557964274  # the 99.9 % quantile of chi2 with 2 degrees of freedom: no noise of this pair explains it
+_MISFIT = CHI2_999_2  # no noise of this pair explains more
 
 
 @dataclass(frozen=True, slots=True, eq=False)

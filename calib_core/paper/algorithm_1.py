@@ -352,15 +352,10 @@ def _pose_by_ransac(
 
 def _kept(scans: RadarScans, keep: Flags) -> RadarScans:
     """Keep some returns; scans left empty are dropped."""
-    counts = np.bincount(scans.scan_of_return()[keep], minlength=len(scans))
-    return RadarScans(
-        times_ns=scans.times_ns[counts > 0],
-        first_return=np.concatenate([[0], np.cumsum(counts[counts > 0])]),
-        points_radar_m=scans.points_radar_m[keep],
-        doppler_mps=scans.doppler_mps[keep],
-        snr_db=scans.snr_db[keep],
-        sigma_polar=scans.sigma_polar[keep],
-    )
+    kept = scans.take(np.flatnonzero(keep))
+    filled = np.diff(kept.first_return) > 0
+    first_return = np.append(kept.first_return[:-1][filled], len(kept.points_radar_m))
+    return replace(kept, times_ns=kept.times_ns[filled], first_return=first_return)
 
 
 def _z_scores(values: Values) -> Values:

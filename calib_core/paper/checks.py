@@ -18,10 +18,10 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import DataWarning
+from calib_core.results.calibration import CHI2_999_2
 
-_MISFIT = 13.816  # squared standard deviations, two degrees of freedom: 1 of 1,000
 _CONTRADICTED = (
-    4.0  # chi2 per degree of freedom: at most 1.8 in 181 right poses, at least 39 in 101 wrong ones (docs/paper.md)
+    4.0  # chi2 per degree of freedom: at most 1.8 in 181 right poses, at least 39 in 101 wrong ones (docs/paper)
 )
 _FAR_CAMERA = 3.0  # expected distances
 _TRUSTED_ROTATION_RAD = np.deg2rad(1.0)  # an error of a method that states no uncertainty is not expected to be larger
@@ -63,7 +63,7 @@ def judged_by_noise(
     hidden = np.isnan(camera.project(camera_from_radar @ points_radar_m)).any(axis=1)
     fit = _modelled(points_radar_m[~hidden], pixels_px[~hidden], camera, camera_from_radar, options)
     agreeing = ~hidden
-    agreeing[~hidden] = fit.model.squared <= _MISFIT
+    agreeing[~hidden] = fit.model.squared <= CHI2_999_2
     warnings = (
         *implausible_input(ids, points_radar_m, pixels_px, camera, options),
         *_contradicted(fit, agreeing, inliers, options),

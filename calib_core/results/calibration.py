@@ -24,6 +24,8 @@ from calib_core.results.systematic_errors import (
 
 CHI2_95_2, CHI2_95_3, CHI2_95_6 = 5.991464547107979, 7.814727903251178, 12.591587243743977
 """95 % quantiles of chi-squared with 2, 3 and 6 degrees of freedom."""
+CHI2_999_2 = 13.815510557964274
+"""The 99.9 % quantile with 2 degrees of freedom."""
 _ROUNDING = 1e-12
 
 
