@@ -226,6 +226,8 @@ const button = /** @type {HTMLButtonElement} */ (document.getElementById("live")
 /** A frame that takes longer than this to come is not waited for [ms]. */
 const PATIENCE = 1500;
 let moving = false;
+/** Whether the newest frame was shown once; a note may come before the frames are known. */
+let begun = false;
 let askedAt = 0;
 /** The cursor at its last event. */
 let seen = -1;
@@ -268,9 +270,11 @@ export function leaveLive() {
 
 /** @param {import("../messages.js").FollowNote} note */
 export function takeFollowing(note) {
-  const first = state.following === null;
   state.following = note;
-  if (first && follows() && state.seconds.length) return goLive();
+  if (!begun && follows() && state.seconds.length) {
+    begun = true;
+    return goLive();
+  }
   if (!follows()) state.live = false;
   emit("following");
 }

@@ -27,6 +27,20 @@ LATE = """async () => {
 }"""
 """Lets the answer to the latest request arrive late, while a newer frame is on screen; says whether that one stays."""
 
+PACE_FIRST = """window.WebSocket = class extends WebSocket {
+  held = [];
+  set onmessage(take) {
+    super.onmessage = (event) => {
+      if (this.held?.push(event) && String(event.data).includes('"type":"following"')) {
+        take(event);
+        for (const earlier of this.held.slice(0, -1)) take(earlier);
+        this.held = null;
+      } else if (!this.held) take(event);
+    };
+  }
+};"""
+"""Lets the note of the pace come before everything else, as when it changes while a page loads."""
+
 
 @pytest.fixture
 def writer(tmp_path: Path) -> Iterator[SampleWriter]:
@@ -79,6 +93,10 @@ def test_the_newest_frame_is_shown_until_the_user_steps_back(page, writer, follo
     page.until(f"__cocalib.state.live && {newest(page)} && __cocalib.state.shown.scale === 1")
     assert page.value("__cocalib.state.playing") is False
     assert page.page.evaluate(LATE)
+
+
+def test_the_newest_frame_is_shown_though_the_pace_was_told_first(open_page, server):
+    open_page(server.url, script=PACE_FIRST).until("__cocalib.state.live")
 
 
 def test_placements_and_advice_appear_while_the_file_grows(page, writer):
