@@ -13,7 +13,7 @@ from calib_core.association.pairing import pair_clicks
 from calib_core.association.placement_groups import PlacementGroup, placement_groups
 from calib_core.camera import Camera
 from calib_core.diagnostics.angle_map import learn_angle_map
-from calib_core.diagnostics.checks import flat_radar, warnings_of
+from calib_core.diagnostics.checks import flat_radar, warnings_of, without_consequences
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks, clocks_apart
 from calib_core.diagnostics.next_placement import next_placement
 from calib_core.diagnostics.solved_fit import SolvedFit
@@ -368,7 +368,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     apart = clocks_apart(used, task.camera, options, solution.refined)
     return replace(
         calibration,
-        warnings=(*apart, *warnings_of(solved_fit)),
+        warnings=without_consequences((*apart, *warnings_of(solved_fit))),
         angle_map=angle_map if angle_map is not None and angle_map.pays else None,
         next_placement=next_placement(calibration),
     )

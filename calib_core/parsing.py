@@ -74,6 +74,9 @@ def json_value(text: str, *, source: str, numbers_as_text: bool = False) -> Any:
             raise InputError(
                 f"{source}: {where}: not JSON: the file ends too early; was it copied completely?"
             ) from None
+        if not error.doc[: error.pos].strip():
+            begins = error.doc.strip().splitlines()[0][:20]
+            raise InputError(f"{source}: not a JSON file, it begins with {begins!r}; give another file") from None
         raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{source}: {_reason(error, text)}") from None

@@ -3,6 +3,8 @@
 A check returns an empty list if all is well.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calib_core.arrays import Flags
@@ -16,7 +18,7 @@ from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.estimation.alternative_poses import NARROW_CONDITION
 from calib_core.estimation.covariance import PoseCovariance, symmetric_inverse
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
+from calib_core.estimation.plausibility import implausible_input
 from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
@@ -37,7 +39,11 @@ _TOLD_BY_MORE = (
     "uncertain-association",
     "shared-error-suspected",
 )
-_FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
+_OF_PIXELS = ("mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected")
+_OF_LENGTHS = ("camera-far-away", "weak-geometry", "two-poses", "lens-or-radar-scale")
+_OF_RETURNS = ("no-consensus", "many-outliers", "agreeing-outliers", "clock-bias-suspected", "doubtful-pair")
+_FOLLOWS = {"pixels-suspected": _OF_PIXELS, "units-suspected": (*_OF_PIXELS, *_OF_LENGTHS), "clocks-apart": _OF_RETURNS}
+"""What a named cause makes likely, and what is said of it would send the user elsewhere."""
 
 
 def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
@@ -62,10 +68,14 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         agreeing_outliers,
         decisive_pair,
     )
-    wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
     warnings = [warning for check in checks for warning in check(fit)]
-    warnings = [warning for warning in warnings if not (wrong_pixels and warning.code in _FOLLOWS_FROM_PIXELS)]
     return (*suspected, *_counted_up(warnings, fit.inliers))
+
+
+def without_consequences(warnings: Sequence[DataWarning]) -> tuple[DataWarning, ...]:
+    """Leave out what follows from a cause that is named."""
+    follows = {code for warning in warnings for code in _FOLLOWS.get(warning.code, ())}
+    return tuple(warning for warning in warnings if warning.code not in follows)
 
 
 def _counted_up(warnings: list[DataWarning], inliers: Flags) -> list[DataWarning]:

@@ -14,8 +14,6 @@ from calib_core.camera import Camera
 from calib_core.measurements import DataWarning, Facts
 from calib_core.options import CalibrationOptions
 
-PIXELS_SUSPECTED = "pixels-suspected"
-
 _FARTHEST_M = 100.0  # a reflector of a few decimetres is then a pixel or two wide
 _FARTHEST_CAMERA_M = 15.0
 _USUAL_RANGE_M = 8.0

@@ -249,6 +249,11 @@ class CalibrationFile:
     aed_either_way_px: tuple[float, float] | None = None
 
     @property
+    def is_contradictory(self) -> bool:
+        """Whether the data contradicted the pose or each other when it was solved: nobody should use it unawares."""
+        return self.verdict is not None and self.verdict.level == "contradictory"
+
+    @property
     def rests_on(self) -> Evidence:
         """What the pose rests on: as stated; else it was clicked if it has solved pairs, and assumed if it has none."""
         return self.evidence or ("clicked" if self.calibration.pairs else "imported_assumed")

@@ -148,6 +148,8 @@ def check(
     pairs: PathLike | None = None,
     of: PathLike | Calibration | CalibrationFile | None = None,
     limits: AgreementLimits | None = None,
+    same_sensors: bool = False,
+    same_person: bool = False,
 ) -> reports.CheckReport:
     """Check a calibration against its check point, another calibration and pairs, and for plausibility.
 
@@ -158,6 +160,8 @@ def check(
         pairs: a pairs-1 or calibration-1 file: radar positions and the pixels where they were seen.
         of: the calibration that the file should have been made from: is it that calibration's file?
         limits: what counts as agreement with `against`; None judges by the covariances.
+        same_sensors: radar and camera of `against` are the same, whatever serials, topics and intrinsics say.
+        same_person: the same person clicked the same reflector in both.
 
     Raises:
         InputError: a file cannot be read, or contains no pose, or a limit cannot be tested with these files.
@@ -169,6 +173,8 @@ def check(
         pairs=None if pairs is None else read_check_pairs_file(Path(pairs)),
         of=None if of is None else _imported(of),
         limits=limits,
+        same_sensors=same_sensors,
+        same_person=same_person,
     )
 
 

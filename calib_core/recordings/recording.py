@@ -41,6 +41,7 @@ from calib_core.results.confirmation import lost_returns
 from calib_core.words.warnings import warning_remark
 
 _HASH_BYTES = 1 << 22
+_GAP = 5.0  # times the usual time between scans
 _STAMP_BYTES = 12
 
 
@@ -228,6 +229,19 @@ class Recording:
         losses = self.losses()
         if losses.lost:
             yield lost_returns(losses.lost, losses.read, "the radar")
+
+    def lost_spans(self) -> tuple[TimesNs, TimesNs]:
+        """Return where radar data of a damaged recording are lost: first (n,) and last (n,) stamps of its gaps, its cut-off end
+        and its unreadable messages.
+        """
+        radar = self._assembly.radar
+        if not self.damage or radar is None:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        unread = np.unique(np.concatenate([part.unreadable_times() for part in radar.parts]))
+        seen = np.setdiff1d(self.radar_times, unread)
+        seen = np.append(seen, self.image_times[self.image_times > self.radar_times[-1]][-1:])
+        long = np.diff(seen) > _GAP * np.median(np.diff(self.radar_times)) if len(seen) > 1 else np.zeros(0, np.bool_)
+        return np.append(seen[:-1][long], unread), np.append(seen[1:][long], unread)
 
     def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
         """Count the radar's lost returns among the scans read so far.

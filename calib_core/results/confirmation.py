@@ -16,14 +16,28 @@ def unconfirmed_warning(unconfirmed: UnconfirmedClicks, count: int) -> DataWarni
     )
 
 
-def damaged_recording(lost: int, damage: DataWarning) -> DataWarning:
-    """Warn that clicks have no radar data in a recording that is damaged.
+_MOST_LOST = 0.05
+_MANY, _MOST = 0.25, 0.5
+
+
+def lost_data(
+    *, clicks: int, without: int, touched: int, share: float, damage: DataWarning | None
+) -> DataWarning | None:
+    """Warn that radar data are lost where they matter; None if they are not.
 
     Args:
-        lost: how many clicks.
-        damage: the recording's own warning.
+        clicks: how many clicks count.
+        without: how many of them have no radar data.
+        touched: how many have none, or not all in their windows.
+        share: of the time without radar data.
+        damage: the recording's own warning that it is damaged; None if it is whole.
     """
-    return DataWarning("damaged-recording", {"lost": lost, "damage": damage})
+    if without > _MANY * clicks:
+        code = "radar-mostly-missing" if without > _MOST * clicks else "radar-missing"
+        return DataWarning(code, {"lost": without, "clicks": clicks, "damage": damage})
+    if damage is None or not (touched or share > _MOST_LOST):
+        return None
+    return DataWarning("damaged-recording", {"lost": touched, "share": share, "damage": damage})
 
 
 def lost_returns(lost: int, read: int, where: str) -> DataWarning:

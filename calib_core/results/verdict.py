@@ -320,6 +320,7 @@ not hold; it rests on an assumption, so it cannot be called good; nothing."""
 CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "clocks-apart",
+        "radar-mostly-missing",
         "algorithm-1-contradicted",
         "behind-camera",
         "mirrored-axes",
@@ -332,6 +333,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "camera-far-away",
     ),
     "coarse": (
+        "radar-missing",
         "damaged-recording",
         "lost-returns",
         "many-outliers",

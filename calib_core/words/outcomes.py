@@ -156,10 +156,14 @@ OUTCOMES: Mapping[str, Row] = {
 
 
 def outcome_remark(outcome: Unsolvable) -> Remark:
-    """Return why there is no calibration, and what to do: first about what looks wrong with the input."""
+    """Return why there is no calibration, and what to do: about what looks wrong with the input, if anything does."""
     own = by_row(outcome, OUTCOMES)
-    causes = [join((cause.message, cause.hint), "; ") for cause in map(warning_remark, outcome.suspected)]
-    return Remark(own.message, join((*causes, own.hint), "; "), own.action)
+    causes = list(map(warning_remark, outcome.suspected))
+    if not causes:
+        return own
+    return Remark(
+        own.message, join((join((cause.message, cause.hint), "; ") for cause in causes), "; "), causes[0].action
+    )
 
 
 def remark_on(stated: DataWarning | Unsolvable | Unpaired) -> Remark:

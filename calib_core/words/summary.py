@@ -7,7 +7,7 @@ from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.calibration import Calibration
 from calib_core.results.radar_axes import RadarAxesSigma, sigma_in_radar_axes
-from calib_core.results.verdict import Verdict
+from calib_core.results.verdict import Verdict, verdict_on
 from calib_core.words.outcomes import outcome_remark, said_of
 from calib_core.words.systematic_errors import dominance_text
 from calib_core.words.verdict import action_words, verdict_line
@@ -42,13 +42,14 @@ def _(verdict: Verdict) -> str:
 
 @in_words.register
 def _(calibration: Calibration) -> str:
-    """Summarize the calibration in nine lines; a radar that measures no elevation adds one."""
+    """Summarize the calibration in ten lines, with the verdict; a radar that measures no elevation adds one."""
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
     pose, metrics, advised = calibration.camera_from_radar, calibration.metrics, calibration.next_placement
     held_out_px = metrics.held_out_aed_px
     advice = "none" if advised is None else "no further placement is needed"
-    if advised is not None and not advised.may_stop:
+    verdict = verdict_on(calibration)
+    if advised is not None and not advised.may_stop and verdict.level != "contradictory":
         x_m, y_m, z_m = advised.position_radar_m
         percent = 100.0 * (1.0 - 1.0 / advised.gain)
         advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m: {percent:.0f} % less uncertainty"
@@ -56,6 +57,7 @@ def _(calibration: Calibration) -> str:
     return "\n".join(
         (
             f"camera_from_radar, method {calibration.options.method}: {agreeing} of {len(used)} clicks agree",
+            f"  verdict         {verdict_line(verdict)}",
             "  translation     " + " ".join(f"{value:.4f}" for value in pose.translation_m) + " m",
             "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
             *(f"  {line}" for line in _uncertainty_lines(calibration)),

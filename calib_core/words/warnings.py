@@ -713,21 +713,37 @@ def nobody_confirmed(*, placed: int, clicks: int, confidence: float) -> Remark:
     )
 
 
-def damaged_recording(*, lost: int, damage: DataWarning) -> Remark:
-    """Given when a part of the recording is damaged or missing, and some clicks have no radar data for it;
-    `provenance.damage` in calibration-1 states damage in any case.
+_COPY_AGAIN = "copy the recording again from its source"
+
+
+def damaged_recording(*, lost: int, share: float, damage: DataWarning) -> Remark:
+    """Given when a part of the recording is damaged or missing, and radar data are lost in the window of a click, or for more
+    than 5 % of the time; `provenance.damage` in calibration-1 states damage in any case.
 
     Could also be: a file that was cut off while it was copied.
     """
-    clicks = f"{count(lost, 'click')} {'has' if lost == 1 else 'have'}"
-    return remark(
-        say(
-            "{clicks} no radar data, and the recording is damaged: {damage}",
-            clicks=clicks,
-            damage=warning_remark(damage).message,
-        ),
-        "copy the recording again from its source",
+    part = (
+        f"radar data are lost at {count(lost, 'click')}" if lost else f"{100 * share:.0f} % of the radar data are lost"
     )
+    return remark(f"{part}: {warning_remark(damage).message}", _COPY_AGAIN)
+
+
+def radar_missing(*, lost: int, clicks: int, damage: DataWarning | None) -> Remark:
+    """Given when more than a quarter of the clicks have no radar data: the recording is damaged, or its radar was not running.
+
+    Could also be: clocks that are apart.
+    """
+    why = "" if damage is None else f": {warning_remark(damage).message}"
+    hint = "use a recording with radar data at every click, or check that both clocks agree"
+    return remark(f"{lost} of {clicks} clicks have no radar data{why}", hint if damage is None else _COPY_AGAIN)
+
+
+def radar_mostly_missing(*, lost: int, clicks: int, damage: DataWarning | None) -> Remark:
+    """Given when more than half of the clicks have no radar data: the others are a part that nobody chose.
+
+    Could also be: the same causes as of radar-missing.
+    """
+    return radar_missing(lost=lost, clicks=clicks, damage=damage)
 
 
 def lost_returns(*, lost: int, read: int, where: str) -> Remark:
@@ -829,6 +845,8 @@ SOLVER = by_code(
     placement_ranges,
     radar_axes_suspected,
     radar_in_vehicle_frame,
+    radar_missing,
+    radar_mostly_missing,
     repeated_placements,
     residuals_too_large,
     shared_error_suspected,

@@ -9,7 +9,7 @@ import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { on, said, state } from "../base/state.js";
-import { frameDrawing, IDENTITY, nameFields, parentFields, rawBox, rectifiedBox } from "./fields.js";
+import { despiteBox, frameDrawing, IDENTITY, nameFields, parentFields, rawBox, rectifiedBox } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 
 /** @typedef {import("./list.js").Format} Format */
@@ -41,6 +41,7 @@ const head = make("div", "what", []);
 const names = nameFields(() => load());
 const rectified = rectifiedBox(() => load());
 const raw = rawBox(() => load());
+const despite = despiteBox(() => load());
 /** @type {ReturnType<typeof parentFields>} */
 let parent;
 const before = make("div", "before", []);
@@ -143,7 +144,7 @@ function build() {
     load();
   });
   const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, raw.row, parent.element, before, text, notes]), side, foot);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, raw.row, despite.row, parent.element, before, text, notes]), side, foot);
 }
 
 /** The formats, and the clicks and the report as two of them. */
@@ -187,6 +188,7 @@ function address(kind) {
   if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
   if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
   if (!raw.row.hidden && raw.box.checked) query.set("raw", "1");
+  if (!despite.row.hidden && despite.box.checked) query.set("despite_verdict", "1");
   for (const [name, value] of names.typed) query.set(name, value);
   return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
 }
@@ -203,9 +205,10 @@ function drawPreview(preview) {
   const kind = preview.is_binary ? `binary, ${size(preview.size_bytes)}; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   names.draw(preview);
-  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified, raw: preview.offers_raw });
+  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified, raw: preview.offers_raw, despite: preview.asks_despite_verdict });
   before.replaceChildren(...beforeSaving(preview));
   show(preview.text, preview.file_name, preview.is_binary);
+  if (!despite.row.hidden && !despite.box.checked) for (const control of [copy, save]) control.disabled = true;
   notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
   side.replaceChildren(
     ...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words), ...numbers(preview)] : []),
@@ -246,12 +249,13 @@ function drawReason(reason, canRetry = false, field = null) {
   for (const control of [fileName, copy, save]) control.disabled = true;
 }
 
-/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, raw?: boolean}} shown */
+/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, raw?: boolean, despite?: boolean}} shown */
 function drawFields(shown) {
   names.element.hidden = !shown.names;
   parent.element.hidden = !shown.parent;
   rectified.row.hidden = !shown.rectified;
   raw.row.hidden = !shown.raw;
+  despite.row.hidden = !shown.despite;
   for (const fields of [names, parent]) fields.refuse("");
 }
 

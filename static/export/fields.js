@@ -133,6 +133,16 @@ export function rawBox(changed) {
   return { box, row: make("div", "rectified raw", [label]) };
 }
 
+/** What is asked before a contradictory calibration is saved; asked again for each. @param {() => void} changed */
+export function despiteBox(changed) {
+  const box = make("input", "", []);
+  box.type = "checkbox";
+  box.addEventListener("change", changed);
+  const label = make("label", "", [box, "Write it nevertheless: the data contradict this calibration"]);
+  label.dataset.hint = "The file says so where it can; on the command line, --despite-verdict.";
+  return { box, row: make("div", "rectified despite", [label]) };
+}
+
 const WIDTH = 280;
 const HEIGHT = 168;
 const RADAR = [72, 72];

@@ -20,7 +20,7 @@ from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
-RECTIFIED = f"{DIALOG} .rectified:not(.raw) input"
+RECTIFIED = f"{DIALOG} .rectified:not(.raw):not(.despite) input"
 
 
 @pytest.fixture(scope="module")
@@ -315,6 +315,19 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
     assert warnings.count() > len(page.view["warnings"]), "also the one that the verdict says"
     for row in page.view["warnings"]:
         expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(page.said(row["message"]))
+
+
+def test_a_contradictory_calibration_is_saved_only_after_a_tick(page: Driver, truth: Any, tmp_path: Path) -> None:
+    halved = [{**one, "pixel_px": [0.5 * value for value in one["pixel_px"]]} for one in truth["placements"]]
+    page.load_sample({**truth, "placements": halved})
+    assert page.view["verdict"]["level"] == "contradictory"
+    page.page.click("#tab-deliver")
+    page.page.click("#export")
+    choose(page, "tf2")
+    expect(page.page.locator(f"{DIALOG} .first")).to_be_disabled()
+    page.page.check(f"{DIALOG} .despite input")
+    expect(page.page.locator(f"{DIALOG} .first")).to_be_enabled()
+    assert "verdict: contradictory" in saved(page, tmp_path).read_text()
 
 
 def test_the_panel_fits_the_screen(solved: Driver) -> None:

@@ -9,7 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import calib_core as cc
 from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.interchange.check.slips import QUESTIONS
 from calib_core.interchange.own.calibration_json import read_calibration
 
 
@@ -56,7 +58,7 @@ def test_json_is_one_object_with_every_file(cocalib, solved, moved, tmp_path):
     assert second.startswith(f"{moved}: wrong: 5 deg")
 
 
-def test_junit_has_a_case_per_result_and_failures_with_words(cocalib, solved, moved, tmp_path):
+def test_junit_has_the_same_cases_whatever_the_answers_and_failures_with_their_code(cocalib, solved, moved, tmp_path):
     (tmp_path / "broken.json").write_text("{}")
     out = tmp_path / "report.xml"
 
@@ -65,14 +67,48 @@ def test_junit_has_a_case_per_result_and_failures_with_words(cocalib, solved, mo
     assert answer.code == 1
     suites = ElementTree.fromstring(out.read_text())
     assert [suite.get("name") for suite in suites] == [str(solved), str(moved), str(tmp_path / "broken.json")]
-    assert [suite.get("failures") for suite in suites] == ["0", "1", "0"]
+    assert [suite.get("failures") for suite in suites] == ["0", "2", "0"]
     assert [suite.get("errors") for suite in suites] == ["0", "0", "1"]
     for suite in suites:
         assert int(suite.get("tests", "0")) == len(suite.findall("testcase")) > 0
-        assert all(case.get("name") and case.get("classname") for case in suite)
-    (failure,) = suites.iter("failure")
-    assert failure.get("type") == "disagrees"
-    assert "5 deg" in (failure.get("message") or "")
+        assert [case.get("name") for case in suite] == ["readable", *QUESTIONS, "verdict"]
+        assert all(case.get("classname") for case in suite)
+    failed = {case.get("name"): failure for case in suites.iter("testcase") for failure in case.iter("failure")}
+    assert {name: failure.get("type") for name, failure in failed.items()} == {
+        "against": "disagrees",
+        "verdict": "wrong",
+    }
+    assert "5 deg" in (failed["against"].get("message") or "")
+
+
+def test_every_result_answers_a_question(cocalib, solved, moved, clicks_file):
+    made = solved.with_name("made.mcap")
+    asked = set()
+    for options in (
+        ("--of", solved),
+        ("--against", solved),
+        ("--pairs", solved),
+        ("--recording", made, "--clicks", clicks_file),
+    ):
+        (file,) = json.loads(cocalib("check", moved, *options, "--json").out)["files"]
+        assert all(result["question"] in QUESTIONS for result in file["results"])
+        asked |= {result["question"] for result in file["results"]}
+    assert {"of", "against", "pairs", "recording"} <= asked
+
+
+def test_in_python_a_check_has_what_json_has(cocalib, solved, tmp_path):
+    other = shutil.copy(solved, tmp_path / "other.json")
+    report = cc.check(other, against=solved, same_sensors=True, same_person=True)
+    answer = cocalib("check", other, "--against", solved, "--same-sensors", "--same-person", "--json")
+    comparison = json.loads(answer.out)["files"][0]["comparison"]
+    assert (report.comparison.shared, report.comparison.unshared) == (
+        tuple(comparison["shared"]),
+        comparison["unshared"],
+    )
+    for key in ("agree", "p_value", "noticeable"):
+        assert getattr(report, key) == comparison[key]
+    alone = cc.check(other)
+    assert (alone.agree, alone.p_value, alone.noticeable) == (None, None, None)
 
 
 def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved(cocalib, solved, clicks_file):

@@ -187,7 +187,9 @@ _TABLE = [
     (11, "batch broken.toml", "2 sessions: 1 solved, 1 refused"),
     (0, "export", "mcap "),
     (0, "export good.json --to tf2", "static_transform_publisher"),
-    (0, "export contradictory.json --to tf2", "contradictory"),
+    (3, "export contradictory.json --to tf2", "--despite-verdict"),
+    (3, "export contradictory.json --to all --out formats", "--despite-verdict"),
+    (0, "export contradictory.json --to tf2 --despite-verdict", "verdict: contradictory"),
     (2, "export bare.txt --to tf2", "not calibration-1"),
     (
         2,

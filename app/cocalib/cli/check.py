@@ -55,7 +55,7 @@ class Check:
     json: Switch = False
     """Print one JSON object instead of text."""
     junit: OutFile = None
-    """Also write the results as JUnit XML: one test case per result."""
+    """Also write the results as JUnit XML: one test case per question, the same whatever the answers."""
     evidence: Annotated[EvidenceFlags, tyro.conf.arg(name=""), MORE] = field(default_factory=EvidenceFlags)
     topics: Topics = field(default_factory=TopicFlags)
     frames: Frames = field(default_factory=FrameFlags)

@@ -95,11 +95,12 @@ class Evaluate:
 
         assert self.calibration is not None
         limits = limits_met(self._limits(), calibration)
-        verdict = imported.file.verdict if imported.file is not None else None
+        file = imported.file
+        verdict, warnings = (None, ()) if file is None else (file.verdict, file.calibration.warnings)
         level = next((level for level in reversed(_LEVELS) if level in self.require), None)
         code = NO_ANSWER if self.judging.recording and evaluation is None else DONE
         code = code if evaluation is None else evaluation_exit_code(evaluation)
-        code = code or exit_code(verdict.level if verdict else None, imported.evidence, level)
+        code = code or exit_code(verdict.level if verdict else None, imported.evidence, level, warnings)
         code = code or (DONE if all(limit.met for limit in limits) else IN_DOUBT)
         if evaluation is not None and self.json:
             names = [path.name for path in self.judging.recording]

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING, Final, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from calib_core.interchange.calibration_file import Evidence
+    from calib_core.measurements import DataWarning
     from calib_core.results.verdict import VerdictLevel
 
 DONE, NO_ANSWER, IN_DOUBT = 0, 1, 3
@@ -20,8 +21,9 @@ _LAW: Final = (
     (
         "solve, import and evaluate",
         "0 done; 1 no answer (evaluate: no clicks or boxes to evaluate against); 3 contradictory, unconfirmed "
-        "assumptions, or below --require",
+        "assumptions, no radar data at more than a quarter of the clicks, or below --require",
     ),
+    ("export", "0 done; 3 contradictory, and nothing is written without --despite-verdict"),
     ("check", "0 agrees or sound; 1 differs or wrong; 2 unreadable; 3 cannot be decided"),
     (
         "batch",
@@ -41,16 +43,27 @@ def exit_codes() -> str:
     return "Exit codes. " + " ".join(f"{commands}: {words}." for commands, words in _LAW)
 
 
-def exit_code(level: "VerdictLevel | None", evidence: "Evidence | None", require: Required | None) -> int:
+_MISSING: Final = "radar-missing"
+"""The code of the warning that puts a coarse answer in doubt."""
+
+
+def exit_code(
+    level: "VerdictLevel | None",
+    evidence: "Evidence | None",
+    require: Required | None,
+    warnings: "Iterable[DataWarning]" = (),
+) -> int:
     """Return 3 if an answer is in doubt, else 0.
 
     Args:
         level: of the verdict on the calibration; None if nobody judged it.
         evidence: what its pose rests on; None if that is not stated.
         require: the least level that is asked for; None asks for none.
+        warnings: of the calibration.
     """
     level = level or "nothing"
-    in_doubt = level == "contradictory" or evidence == "imported_assumed"
+    missing = any(warning.code == _MISSING for warning in warnings)
+    in_doubt = level == "contradictory" or evidence == "imported_assumed" or missing
     return IN_DOUBT if in_doubt or level not in _ENOUGH.get(require, (level,)) else DONE
 
 

@@ -10,6 +10,7 @@ import tyro
 
 from calib_core.errors import InputError, RecordingError
 from calib_core.words.outcomes import said_of
+from cocalib.cli.exit_codes import IN_DOUBT
 from cocalib.cli.flags import OUTPUT_FOLDER, Output, OutputFlags, Switch, called
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import TopicFlags, Topics
@@ -48,6 +49,8 @@ class Export:
     """Your images are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
     for_: Annotated[Literal["raw"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
     """raw: the pose for radar data as reported, for software that cannot correct radar biases."""
+    despite_verdict: Switch = False
+    """Write a calibration that is contradictory, too; the file says so where it can."""
     trees: Trees = field(default_factory=TreeFlags)
     frames: Frames = field(default_factory=FrameFlags)
 
@@ -59,30 +62,36 @@ class Export:
     def run(self) -> int:
         """Write the export; return the exit code."""
         from calib_core.interchange.exporting import parent_pose
-        from calib_core.interchange.formats.registry import format_named, written_formats
+        from calib_core.interchange.formats.registry import format_named
 
         if self.to == MCAP or self.recording or self.topics != TopicFlags():
             return self._export_recording()
+        if self.to == "list" and not self.trees.into:
+            return self._print_list()
+        if self.to not in ("list", "all"):
+            format_named(self.to)
+        file = self._calibration()
+        if self._is_refused(file):
+            return IN_DOUBT
         if self.trees.into:
-            file = self._calibration()
             code = self.trees.patch(file, self.frames, to=self.to, out=self.out)
             _print_warnings(file)
             return code
-        if self.to == "list" and len(self.calibration) > 1:
-            raise InputError(f"export takes one calibration; did you mean --to {self.calibration[1]}?")
-        if self.to == "list":
-            formats = written_formats()
-            width = max(len(known.name) for known in formats)
-            print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
-            print(f"{MCAP:<{width}}  a ROS recording with the calibration in it (--recording), for Foxglove and RViz")
-            return 0
-        if self.to != "all":
-            format_named(self.to)
-        file = self._calibration()
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
         if self.to == "all":
             return _write_all(self.frames.renamed(file), self.out, parent_from_radar=parent, rectified=self.rectified)
         return self._write_one(file, parent)
+
+    def _print_list(self) -> int:
+        from calib_core.interchange.formats.registry import written_formats
+
+        if len(self.calibration) > 1:
+            raise InputError(f"export takes one calibration; did you mean --to {self.calibration[1]}?")
+        formats = written_formats()
+        width = max(len(known.name) for known in formats)
+        print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
+        print(f"{MCAP:<{width}}  a ROS recording with the calibration in it (--recording), for Foxglove and RViz")
+        return 0
 
     def _write_one(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
         renamed = self.frames.renamed(file)
@@ -111,6 +120,14 @@ class Export:
         file = _own_calibration(self.calibration[0])
         return file if self.for_ is None else for_raw(file)
 
+    def _is_refused(self, file: "CalibrationFile") -> bool:
+        """Say that a contradictory calibration is not written, unless the user wants it."""
+        if not file.is_contradictory or self.despite_verdict:
+            return False
+        _print_warnings(file)
+        print("cocalib: nothing is written; --despite-verdict writes it nevertheless", file=sys.stderr)
+        return True
+
     def _export_recording(self) -> int:
         """Write the recording again with the calibration in it; return the exit code."""
         if self.to != MCAP:
@@ -124,6 +141,8 @@ class Export:
         if self.for_ is not None:
             raise InputError(f"--for raw does not apply to --to {MCAP}: it writes the corrections, too")
         file = _own_calibration(self.calibration[0])
+        if self._is_refused(file):
+            return IN_DOUBT
         code = _into_recording(file, self.recording, self.out, topics=self.topics)
         _print_warnings(file)
         return code

@@ -271,7 +271,8 @@ class Import:
         write_whole(self.out, write(file))
         print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
         print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
-        return exit_code(file.verdict.level if file.verdict else None, file.rests_on, self.require)
+        level = file.verdict.level if file.verdict else None
+        return exit_code(level, file.rests_on, self.require, file.calibration.warnings)
 
 
 _RESTS_ON = {

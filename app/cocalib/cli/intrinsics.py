@@ -13,6 +13,7 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import LensChoice
 from calib_core.recordings import RecordingOptions
+from calib_core.words.outcomes import said_of
 from cocalib.cli.flags import MORE, OutFile, OutFolder, Output, OutputFlags, Switch, called, same
 from cocalib.cli.output import explain_unsolvable
 from cocalib.platform.files import write_whole
@@ -192,6 +193,8 @@ class Intrinsics:
                 coverage=coverage,
             )
             print_exactly(text)
+            for warning in lens.warnings:
+                print(f"warning: {said_of(warning)}", file=sys.stderr)
         else:
             print("\n".join(lens_lines(lens, found, coverage, verbose=self.verbose)))
         if self.out is not None:

@@ -143,15 +143,20 @@ def recorded_clicks(
 _OF_FRAMES = ("radar-in-vehicle-frame", "radar-looks-left")
 
 
-def tell_choices(recording: "Recording") -> None:
-    """Print to stderr which radar and which camera are used and why, where there are several, and what is wrong with them."""
+def tell_choices(recording: "Recording", *, but: str = "") -> None:
+    """Print to stderr which radar and which camera are used and why, where there are several, and what is wrong with them.
+
+    Args:
+        recording: that is used.
+        but: the code of a warning that the verdict will say.
+    """
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
     from calib_core.words.warnings import warning_remark
 
     _tell_notes(recording.radar_clock_notes)
-    doubted = [warning for warning in recording.warnings if warning.code in _OF_FRAMES]
+    doubted = [warning for warning in recording.warnings if warning.code in _OF_FRAMES and warning.code != but]
     _tell_notes([str(warning_remark(warning).message) for warning in (*doubted, *recording.damage)])
 
 

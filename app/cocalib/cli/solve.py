@@ -13,6 +13,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
+from calib_core.words.verdict import verdict_line
 from cocalib.cli.exit_codes import exit_code
 from cocalib.cli.flags import MORE, File, MoreSwitch, OutFile, Output, OutputFlags, Require, Switch
 from cocalib.cli.output import (
@@ -156,7 +157,7 @@ class Solve:
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from cocalib.solving.automatic import solve_placed_clicks
         from cocalib.solving.recorded_clicks import SPEED_UNIT, require_confirmed, speed_unit_notes
-        from cocalib.solving.solving import calibration_text, required_camera
+        from cocalib.solving.solving import VEHICLE_FRAME, calibration_text, required_camera
 
         self._require_folders()
         camera_file = self.camera.read()
@@ -164,7 +165,7 @@ class Solve:
         file = self._clicks_file()
         with self.recorded.open() as recording:
             require_confirmed(recording, but=SPEED_UNIT)
-            tell_choices(recording)
+            tell_choices(recording, but=VEHICLE_FRAME)
             camera = required_camera(recording, camera_file)
             placed = self._clicks_to_solve(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
@@ -248,11 +249,13 @@ class Solve:
         return self._deliver(outcome, calibration_text_of_pairs(outcome, given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
-        code = exit_code(verdict_on(calibration).level, None, self.require)
+        verdict = verdict_on(calibration)
+        code = exit_code(verdict.level, None, self.require, calibration.warnings)
         if self.camera.camera is not None and not len(calibration.camera.distortion):
             print(f"note: {self.camera.camera} states no distortion: the lens is taken to have none", file=sys.stderr)
         if self.out is None:
             print_exactly(text)
+            print(f"verdict: {on_terminal(verdict_line(verdict))}", file=sys.stderr)
             return code
         write_whole(self.out, text)
         print("\n".join([*map(on_terminal, summary_lines(calibration)), f"written to {self.out}"]))

@@ -13,7 +13,7 @@ from calib_core.errors import InputError
 from calib_core.evaluation.residuals import ResidualTest, residual_test
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
 from calib_core.interchange.check.report import CheckReport
-from calib_core.interchange.check.slips import CheckResult
+from calib_core.interchange.check.slips import CheckResult, answering
 from calib_core.interchange.format import ImportedCalibration
 from calib_core.interchange.importing import adopted_calibration
 from calib_core.measurements import MIN_PAIRS, ReflectorClick
@@ -56,6 +56,7 @@ def stale_inputs(imported: ImportedCalibration, inputs: Sequence[InputFile]) -> 
             f"the calibration was made from another {one.name} (sha256 {named[one.name].sha256[:12]}..., this one's is "
             f"{one.sha256[:12]}...)",
             "right if this is another recording of the same name",
+            "recording",
         )
         for one in inputs
         if one.name in named and named[one.name].sha256 != one.sha256
@@ -71,7 +72,9 @@ def other_camera(imported: ImportedCalibration, camera: Camera | None) -> tuple[
     if lens is None or lens.same or _was_refined_from(imported, camera):
         return ()
     message = f"the recording states other intrinsics than the calibration: {lens.text}"
-    return (CheckResult("warning", "other-lens", message, "the residuals are through the calibration's own"),)
+    return (
+        CheckResult("warning", "other-lens", message, "the residuals are through the calibration's own", "recording"),
+    )
 
 
 def _was_refined_from(imported: ImportedCalibration, camera: Camera) -> bool:
@@ -112,7 +115,7 @@ def with_recording(
         raise InputError(
             f"{source}: {len(pairs)} clicks have radar returns in this recording; the comparison needs at least {MIN_PAIRS}"
         )
-    result = _result(residual_test(pairs, calibration), calibration)
+    (result,) = answering("recording", [_result(residual_test(pairs, calibration), calibration)])
     if report.imported.camera is None:
         message = f"{result.message}; through the given intrinsics or the recording's, because the file has none"
         result = dataclasses.replace(result, message=message)

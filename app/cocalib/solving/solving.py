@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
+
 from calib_core.association.pairing import RadarSource, half_window_s, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
@@ -20,13 +22,13 @@ from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.pair_tables import PairTable, read_pair_table
-from calib_core.measurements import Candidate, DataWarning, ReflectorClick, Unsolvable
+from calib_core.measurements import NS_PER_S, Candidate, DataWarning, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, RecordingOptions, assumption_warnings
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
-from calib_core.results.confirmation import damaged_recording, lost_returns
+from calib_core.results.confirmation import lost_data, lost_returns
 from calib_core.words.warnings import warning_remark
 from cocalib.platform.resources import version
 from cocalib.session.state import Outcome
@@ -37,8 +39,9 @@ _MOST_CANDIDATES = 50
 _MOST_LOST = 0.05
 """Share of the returns."""
 
-_VEHICLE_FRAME = "radar-in-vehicle-frame"
-_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns", "damaged-recording", _VEHICLE_FRAME)
+VEHICLE_FRAME = "radar-in-vehicle-frame"
+_LOST_DATA = ("damaged-recording", "radar-missing", "radar-mostly-missing")
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns", *_LOST_DATA, VEHICLE_FRAME)
 """What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
@@ -98,18 +101,33 @@ def solve_in_steps(
     for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
         if of_recording and isinstance(outcome, Calibration):
             outcome = dataclasses.replace(outcome, warnings=(*of_recording, *outcome.warnings))
-        yield _with_damage(outcome, recording) if isinstance(recording, Recording) else outcome
+        yield _with_lost_data(outcome, recording, clicks, options) if isinstance(recording, Recording) else outcome
 
 
-def _with_damage(outcome: Calibration | Unsolvable, recording: Recording) -> Calibration | Unsolvable:
-    """Let it lead the verdict if the recording is damaged and there are no returns around some clicks."""
-    lost, damage = sum(one.code == "no-scan" for one in outcome.unpaired), recording.damage
-    if not (damage and lost):
+def _with_lost_data(
+    outcome: Outcome, recording: Recording, clicks: Sequence[ReflectorClick], options: CalibrationOptions
+) -> Outcome:
+    """Let it lead the verdict if radar data are lost around clicks, or for much of the time; then of course pairs are few."""
+    times = {click.id: click.image_time for click in clicks if click.counts}
+    begin, end = recording.lost_spans()
+    half_ns = round(options.locating.window_s / 2 * NS_PER_S)
+    near = {name for name, time in times.items() if ((begin <= time + half_ns) & (end >= time - half_ns)).any()}
+    without = {one.id for one in outcome.unpaired if one.id in times and (one.code == "no-scan" or one.id in near)}
+    recorded_ns = np.ptp(np.concatenate([recording.radar_times, end])) if len(end) else 1
+    warning = lost_data(
+        clicks=len(times),
+        without=len(without),
+        touched=len(without | near),
+        share=float((end - begin).sum() / max(recorded_ns, 1)),
+        damage=next(iter(recording.damage), None),
+    )
+    if warning is None:
         return outcome
-    warning = damaged_recording(lost, damage[0])
     if isinstance(outcome, Unsolvable):
-        return dataclasses.replace(outcome, suspected=(warning, *outcome.suspected))
-    return dataclasses.replace(outcome, warnings=(warning, *outcome.warnings))
+        known = warning.facts["damage"] is not None
+        return dataclasses.replace(outcome, suspected=(warning, *outcome.suspected)) if known else outcome
+    others = (one for one in outcome.warnings if one.code != "few-pairs" or not without)
+    return dataclasses.replace(outcome, warnings=(warning, *others))
 
 
 def _of_recording(
@@ -118,7 +136,7 @@ def _of_recording(
     """Warn if returns are in a vehicle's frame, or lost: around the clicks, or more than 5 % of those read so far."""
     if not isinstance(recording, Recording):
         return ()
-    moved = (warning for warning in recording.warnings if warning.code == _VEHICLE_FRAME)
+    moved = (warning for warning in recording.warnings if warning.code == VEHICLE_FRAME)
     return (*moved, *_lost_returns(recording, clicks, options))
 
 

@@ -185,7 +185,8 @@ def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
         rows.insert(len(pose), words(f"assumed, because this radar measures no elevation: {parts}"))
     lines += rows
-    lines += ["uncertainty: " + line for line in uncertainty_sentences(calibration)]
+    if verdict.level != "contradictory":
+        lines += ["uncertainty: " + line for line in uncertainty_sentences(calibration)]
     lines += ["intrinsics: " + words(line) for line in refined_sentences(calibration)]
     disagreeing = [pair for pair in calibration.pairs if not pair.inlier and not pair.excluded and pair.rival < 0]
     lines += [

@@ -240,7 +240,7 @@ def _pair_at(file: CalibrationFile) -> str | None:
     return pairs[nearest].id if apart_m[nearest] < _SAME_M else None
 
 
-Field = Literal["frames", "parent", "rectified", "raw"]
+Field = Literal["frames", "parent", "rectified", "raw", "despite_verdict"]
 """A part of the panel that the user fills in."""
 
 _RADAR_FRAME, _CAMERA_FRAME, _PARENT = "radar_frame", "camera_frame", "parent_from_radar"
@@ -267,31 +267,39 @@ class Fields:
         parent_from_radar: the radar's pose in a third frame; None for the radar as origin.
         rectified: the images are rectified.
         raw: the pose is to fit radar data as reported.
+        despite_verdict: a contradictory calibration is to be written, too.
     """
 
     frames: FrameNames
     parent_from_radar: RigidTransform | None
     rectified: bool
     raw: bool
+    despite_verdict: bool
 
 
 def fields_in(query: str, usual: FrameNames) -> Fields:
     """Return the fields in the query of a URL.
 
     Args:
-        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw`, `rectified=1` and `raw=1`, each
-            optional.
+        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw`, `rectified=1`, `raw=1` and
+            `despite_verdict=1`, each optional.
         usual: the calibration's frame names, for what the query does not name.
 
     Raises:
-        FieldError: a name cannot be a frame's, a pose is none, or rectified or raw is neither 0 nor 1.
+        FieldError: a name cannot be a frame's, a pose is none, or one of the others is neither 0 nor 1.
     """
     given = {key: values[-1] for key, values in parse_qs(query, keep_blank_values=True).items()}
     try:
         frames = FrameNames(given.get(_RADAR_FRAME, usual.radar), given.get(_CAMERA_FRAME, usual.camera))
     except InputError as error:
         raise FieldError("frames", str(error)) from None
-    return Fields(frames, _parent_in(given.get(_PARENT, "")), _yes_or_no("rectified", given), _yes_or_no("raw", given))
+    return Fields(
+        frames,
+        _parent_in(given.get(_PARENT, "")),
+        _yes_or_no("rectified", given),
+        _yes_or_no("raw", given),
+        _yes_or_no("despite_verdict", given),
+    )
 
 
 def _parent_in(text: str) -> RigidTransform | None:
@@ -307,7 +315,7 @@ def _parent_in(text: str) -> RigidTransform | None:
         raise FieldError("parent", str(error)) from None
 
 
-def _yes_or_no(field: Literal["rectified", "raw"], given: Mapping[str, str]) -> bool:
+def _yes_or_no(field: Literal["rectified", "raw", "despite_verdict"], given: Mapping[str, str]) -> bool:
     text = given.get(field, "0")
     if text not in ("0", "1"):
         raise FieldError(field, f"{field}: {text!r} is neither 0 nor 1; 1 means yes")

@@ -28,8 +28,10 @@ from calib_core.interchange.check.agreement import (
 from calib_core.interchange.check.pair_residuals import CheckPairs, by_own_pairs, by_pairs
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, Lenses, far_outside, lenses_of, shown
 from calib_core.interchange.check.slips import (
+    QUESTIONS,
     CheckResult,
     Rounding,
+    answering,
     explain,
     explained,
     rounding_of,
@@ -43,6 +45,7 @@ from calib_core.interchange.own.raw_data import for_raw
 from calib_core.interchange.rotations import looks_forward, off_forward_rad
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.radar import RadarErrors
+from calib_core.words.warnings import warning_remark
 
 Verdict = Literal["right", "wrong", "doubtful", "unproven"]
 """Confirmed; contradicted; implausible, with nothing to test it against; plausible, with nothing to test it against."""
@@ -62,7 +65,7 @@ _BORROWED_EVIDENCE = {"against": frozenset({"agrees"}), "of": frozenset({"same-p
 _DIFFERENCES = frozenset({"disagrees"})
 _ANY_SIZE_PX = (1000, 1000)
 _ASSUMED_REFERENCE = "assumed-reference"
-_CONTRADICTORY = "contradictory"
+_CONTRADICTORY, _RADAR_MISSING = "contradictory", "radar-missing"
 _IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere", "on-its-side", "placeholder", _CONTRADICTORY})
 
 
@@ -100,6 +103,26 @@ class CheckReport:
         if any(result.level == "good" and result.code not in self.no_proof for result in self.results):
             return "right"
         return "doubtful" if any(result.code in _IMPLAUSIBLE for result in self.results) else "unproven"
+
+    @property
+    def agree(self) -> bool | None:
+        """Whether the two calibrations agree; None without another one."""
+        return None if self.judgement is None else self.judgement.agree
+
+    @property
+    def p_value(self) -> float | None:
+        """How often right calibrations differ by as much, by their covariances; None if these do not say."""
+        change = self.comparison.change if self.comparison is not None else None
+        return None if change is None else change.p_value
+
+    @property
+    def noticeable(self) -> dict[str, float] | None:
+        """The change along each axis that would be noticed with 95 %, such as "rotX_deg"; None if the covariances do not say."""
+        change = self.comparison.change if self.comparison is not None else None
+        if change is None:
+            return None
+        sizes = zip(AXES, change.noticeable(LEVEL).tolist(), strict=True)
+        return {f"{axis}_{'deg' if k < 3 else 'cm'}": size for k, (axis, size) in enumerate(sizes)}
 
     @property
     def rests_on_assumption(self) -> bool:
@@ -162,16 +185,18 @@ def check(
     if imported.for_raw:
         of, against = (None if one is None else _as_reported(one) for one in (of, against))
         pairs = None if pairs is None else dataclasses.replace(pairs, radar_errors=RadarErrors())
-    results = [
+    faults = [
         CheckResult("error", "contradiction", fault, "correct the one that is wrong") for fault in imported.faults
     ]
+    results = answering("consistent", faults)
     known = (imported, of, against, pairs)
     camera = imported.camera or camera or next((one.camera for one in known if one and one.camera), None)
     stated = imported.check_point
     if stated is not None:
-        results.append(by_check_point(imported.pose, stated, camera, own=_own_camera(imported)))
+        point = by_check_point(imported.pose, stated, camera, own=_own_camera(imported))
+        results += answering("check-point", [point])
     if of is not None:
-        results += by_its_calibration(imported, of)
+        results += answering("of", by_its_calibration(imported, of))
     comparison = (
         compare(against, imported, camera=camera, same_sensors=same_sensors, same_person=same_person)
         if against is not None
@@ -180,19 +205,21 @@ def check(
     judgement = judge(comparison, limits or AgreementLimits()) if comparison is not None else None
     if against is not None and comparison is not None and judgement is not None:
         changed = any(result.code == CHECK_POINT_MISSED for result in results)
-        results += by_other_calibration(
+        agreement = by_other_calibration(
             imported, against, comparison, judgement, limits or AgreementLimits(), changed=changed
         )
+        results += answering("against", agreement)
     if pairs is not None:
-        results += by_pairs(imported, pairs.under(imported.file.calibration) if imported.file else pairs)
-    results += by_own_pairs(imported)
+        given = pairs.under(imported.file.calibration) if imported.file else pairs
+        results += answering("pairs", by_pairs(imported, given))
+    results += answering("own-pairs", by_own_pairs(imported))
     no_proof = _no_proof(imported, against=against, of=of)
-    results += _by_own_verdict(imported)
+    results += answering("solved", _by_own_verdict(imported))
     results += _assumed_references(against=against, of=of)
-    untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, _CONTRADICTORY, *no_proof}
+    untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, _CONTRADICTORY, _RADAR_MISSING, *no_proof}
     tested = [result for result in results if result.code not in untested]
     if not tested or (against is None and not any(result.level == "error" for result in tested)):
-        results += by_plausibility(imported.pose, verified=bool(tested))
+        results += answering("plausible", by_plausibility(imported.pose, verified=bool(tested)))
     return CheckReport(imported, tuple(results), comparison, judgement, no_proof)
 
 
@@ -222,13 +249,15 @@ def _no_proof(imported: ImportedCalibration, **others: ImportedCalibration | Non
 
 
 def _by_own_verdict(imported: ImportedCalibration) -> list[CheckResult]:
-    """Pass on that the pose was contradictory when it was solved: then its own check point and pairs prove nothing."""
-    verdict = imported.file.verdict if imported.file is not None else None
-    if verdict is None or verdict.level != "contradictory":
+    """Pass on that the pose was in doubt when it was solved: then its own check point and pairs prove nothing."""
+    file = imported.file
+    if file is None or file.verdict is None:
         return []
-    return [
-        CheckResult("warning", _CONTRADICTORY, f"contradictory when it was solved: {verdict.reason}", verdict.action)
-    ]
+    if file.is_contradictory:
+        message = f"contradictory when it was solved: {file.verdict.reason}"
+        return [CheckResult("warning", _CONTRADICTORY, message, file.verdict.action)]
+    missing = [warning_remark(one) for one in file.calibration.warnings if one.code == _RADAR_MISSING]
+    return [CheckResult("warning", _RADAR_MISSING, str(one.message), str(one.hint)) for one in missing]
 
 
 def _assumed_references(**others: ImportedCalibration | None) -> list[CheckResult]:
@@ -238,6 +267,7 @@ def _assumed_references(**others: ImportedCalibration | None) -> list[CheckResul
             _ASSUMED_REFERENCE,
             f"what the file given with --{option} means was assumed when it was imported: being like it proves nothing",
             "prove that one first: cocalib import FILE --pairs PAIRS",
+            option,
         )
         for option, other in others.items()
         if _is_assumed(other)
@@ -607,24 +637,21 @@ def _comparison(report: CheckReport) -> dict[str, Any] | None:
             for at in both.pixels
         ],
         "lens": lens,
-        **_change(both),
+        **_change(report),
         "covariances": both.covariances,
         "shared": list(both.shared),
         "unshared": both.unshared,
     }
 
 
-def _change(both: Comparison) -> dict[str, Any]:
-    change = both.change
-    if change is None:
-        return dict.fromkeys(("chi2", "chi2_limit", "p_value", "sigmas", "noticeable"))
-    sizes = zip(AXES, change.noticeable(LEVEL).tolist(), strict=True)
+def _change(report: CheckReport) -> dict[str, Any]:
+    change = report.comparison.change if report.comparison is not None else None
     return {
-        "chi2": change.squared,
-        "chi2_limit": change.limit(LEVEL),
-        "p_value": change.p_value,
-        "sigmas": change.sigmas,
-        "noticeable": {f"{axis}_{'deg' if k < 3 else 'cm'}": size for k, (axis, size) in enumerate(sizes)},
+        "chi2": None if change is None else change.squared,
+        "chi2_limit": None if change is None else change.limit(LEVEL),
+        "p_value": report.p_value,
+        "sigmas": None if change is None else change.sigmas,
+        "noticeable": report.noticeable,
     }
 
 
@@ -634,7 +661,7 @@ def _number(value: float) -> float | None:
 
 
 def check_junit(files: Sequence[CheckedFile]) -> str:
-    """Return the reports as JUnit XML: a test suite per file, a test case per result."""
+    """Return the reports as JUnit XML: a test suite per file, the same test case per question whatever the answers."""
     root = ElementTree.Element("testsuites", name="cocalib check")
     for file in files:
         _add_suite(root, file)
@@ -644,13 +671,13 @@ def check_junit(files: Sequence[CheckedFile]) -> str:
 
 def _add_suite(root: ElementTree.Element, file: CheckedFile) -> None:
     suite = ElementTree.SubElement(root, "testsuite", name=_xml(file.name))
+    readable = _case(suite, file, "readable")
     if file.report is None:
-        case = _case(suite, file, "readable")
-        ElementTree.SubElement(case, "error", message=_xml(file.unreadable), type="unreadable")
-    else:
-        for result in file.report.results:
-            _add_result(suite, file, result)
-        _add_verdict(suite, file)
+        ElementTree.SubElement(readable, "error", message=_xml(file.unreadable), type="unreadable")
+    results = file.report.results if file.report else ()
+    for question in QUESTIONS:
+        _add_answer(_case(suite, file, question), [result for result in results if result.question == question])
+    _add_verdict(_case(suite, file, "verdict"), file)
     for key, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(key, str(len(list(suite.iter(tag)))))
 
@@ -659,22 +686,25 @@ def _case(suite: ElementTree.Element, file: CheckedFile, name: str) -> ElementTr
     return ElementTree.SubElement(suite, "testcase", classname=_xml(file.name), name=name, time="0")
 
 
-def _add_result(suite: ElementTree.Element, file: CheckedFile, result: CheckResult) -> None:
-    case = _case(suite, file, result.code)
-    text = _xml(f"{result.message}; {result.hint}" if result.hint else result.message)
-    if result.level == "error":
-        ElementTree.SubElement(case, "failure", message=text, type=result.code)
-    else:
+def _add_answer(case: ElementTree.Element, results: Sequence[CheckResult]) -> None:
+    """Fill a case: it fails with the code of its first error, and is skipped if nothing answers it."""
+    if not results:
+        ElementTree.SubElement(case, "skipped", message="nothing to answer it with, or nothing to say")
+        return
+    text = _xml("; ".join(filter(None, (part for result in results for part in (result.message, result.hint)))))
+    wrong = next((result.code for result in results if result.level == "error"), None)
+    if wrong is None:
         ElementTree.SubElement(case, "system-out").text = text
+    else:
+        ElementTree.SubElement(case, "failure", message=text, type=wrong)
 
 
-def _add_verdict(suite: ElementTree.Element, file: CheckedFile) -> None:
-    """Add a case for the proof as a whole: a doubtful file fails, an unproven one is skipped."""
-    assert file.report is not None
-    case, text = _case(suite, file, "verdict"), _xml(file.report.lines()[-1])
-    if file.verdict == "doubtful":
-        ElementTree.SubElement(case, "failure", message=text, type="doubtful")
-    elif file.verdict == "unproven":
+def _add_verdict(case: ElementTree.Element, file: CheckedFile) -> None:
+    """Fill the case for the proof as a whole: a wrong or doubtful file fails, one that is not decided or not read is skipped."""
+    text = _xml(file.line if file.report is None else file.report.lines()[-1])
+    if file.verdict in ("wrong", "doubtful"):
+        ElementTree.SubElement(case, "failure", message=text, type=file.verdict)
+    elif file.verdict != "right":
         ElementTree.SubElement(case, "skipped", message=text)
 
 

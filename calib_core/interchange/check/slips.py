@@ -1,8 +1,8 @@
 """What explains a mismatch: rounding, or a slip between a right calibration and a wrong file, with the edit that undoes it."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import combinations
 from typing import Literal
@@ -247,12 +247,24 @@ class CheckResult:
         code: one word for programs.
         message: what was found, with figures.
         hint: what to do about it; empty if nothing needs to be done.
+        question: which of `QUESTIONS` it answers; the same whatever the answer.
     """
 
     level: Literal["good", "warning", "error"]
     code: str
     message: str
     hint: str = ""
+    question: str = ""
+
+
+QUESTIONS = ("consistent", "check-point", "of", "against", "pairs", "own-pairs", "recording", "plausible", "solved")
+"""Is the file consistent, does it reproduce its check point, is it the file of --of, does it agree with --against, with --pairs
+and with its own pairs, does it hold on the recording, is its pose plausible, was it trusted when it was solved."""
+
+
+def answering(question: str, results: Iterable[CheckResult]) -> list[CheckResult]:
+    """Return results as answers to a question."""
+    return [replace(result, question=question) for result in results]
 
 
 def explain(

@@ -187,6 +187,11 @@ class RadarStream(ScanBlocks):
         ScanBlocks.__init__(other, self.times_ns)
         return other
 
+    def unreadable_times(self) -> TimesNs:
+        """Return the stamps of the scans with a message that could not be read so far."""
+        messages = np.array(sorted(self.unreadable), dtype=np.int64)[:, None]
+        return self.times_ns[((self._first <= messages) & (messages < self._last)).any(axis=0)]
+
     def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
         """Count what was lost in the scans read so far: in all, or in those within half_window_s of any of the times."""
         if self.layout.plan.azimuth_from is not None:

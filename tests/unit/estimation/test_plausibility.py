@@ -105,6 +105,13 @@ def test_a_position_in_centimetres_is_blamed_rather_than_the_placements():
         assert "degenerate-placements" not in found
 
 
+def test_what_follows_from_a_named_unit_is_not_said(simulated):
+    points, pixels = arrays(simulated)
+    found = set(found_in(simulated, 1000.0 * points, pixels))
+    assert "units-suspected" in found
+    assert not {"weak-geometry", "camera-far-away", "two-poses", "handedness-assumed"} & found
+
+
 def test_a_unit_is_named_only_if_the_pairs_place_the_camera_clearly_away_from_the_radar(simulated):
     for seed in range(3):
         near = simulate_pairs(20, rng=np.random.default_rng([93, seed]))

@@ -13,6 +13,7 @@ from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import acc, aed, cdsd, metrics_of, rms
+from calib_core.results.verdict import verdict_on
 from calib_core.words.outcomes import said_of
 
 POINT = np.array([[8.0, 0.5, 0.0]])
@@ -39,9 +40,13 @@ def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated):
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_a_calibration_prints_as_nine_lines(simulated, method):
+def test_a_calibration_prints_as_ten_lines(simulated, method):
     lines = str(solved(simulated, CalibrationOptions(method=method))).splitlines()
-    assert len(lines) == 9
+    assert len(lines) == 10
+    assert lines[1].split()[:2] == [
+        "verdict",
+        f"{verdict_on(solved(simulated, CalibrationOptions(method=method))).level}:",
+    ]
     assert max(map(len, lines)) < 120
     for word in (
         "clicks agree",

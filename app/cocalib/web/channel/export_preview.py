@@ -61,6 +61,7 @@ class ExportPreview:
         missing: what the calibration has and this file cannot hold; "" if nothing.
         warnings: of the calibration.
         offers_raw: the pose is for corrected radar data, and one for data as reported can be written.
+        asks_despite_verdict: the calibration is contradictory: whoever saves it says so.
     """
 
     key: str
@@ -83,6 +84,7 @@ class ExportPreview:
     missing: str
     warnings: tuple[WarningRow, ...]
     offers_raw: bool
+    asks_despite_verdict: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +104,14 @@ def exported(file: CalibrationFile, key: str, query: str) -> Export:
     """Write a calibration in a format, with what the user filled in, from a URL's query.
 
     Raises:
-        FieldError: a field cannot be used, or the format needs it.
+        FieldError: a field cannot be used, the format needs it, or the calibration is contradictory and nobody said to write it.
         InputError: the format cannot hold this calibration, or has no third frame.
     """
     fields = fields_in(query, file.frames)
+    if _asks_despite_verdict(file, key) and not fields.despite_verdict:
+        raise FieldError(
+            "despite_verdict", "the calibration is contradictory; tick that it is to be written nevertheless"
+        )
     return _exported(_meant(file, key, fields), key, fields)
 
 
@@ -151,7 +157,13 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         missing=" ".join(map(sentence, lost)),
         warnings=tuple(map(warning_row, file.calibration.warnings)),
         offers_raw=file.corrected is not None or written.needs_corrections,
+        asks_despite_verdict=_asks_despite_verdict(file, key),
     )
+
+
+def _asks_despite_verdict(file: CalibrationFile, key: str) -> bool:
+    """Return whether to ask before saving: not for our own format, whose readers know the verdict."""
+    return file.is_contradictory and key != "json"
 
 
 def _meant(file: CalibrationFile, key: str, fields: Fields) -> CalibrationFile:

@@ -23,7 +23,9 @@ from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
 from calib_core.results import Calibration, DataWarning
 from calib_core.results.actions import FollowHint
+from calib_core.results.confirmation import lost_data
 from calib_core.results.verdict import verdict_on
+from cocalib.cli.exit_codes import exit_code
 from cocalib.platform.resources import version
 from cocalib.session.events import ClicksImported, OptionsChanged
 from cocalib.solving.solving import (
@@ -106,8 +108,19 @@ def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(recor
     assert verdict_on(outcome).level == "contradictory"
 
 
-@pytest.mark.parametrize(("share", "lost"), [(1.0, 0), (0.5, 9), (0.125, 18)])
-def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(sample, tmp_path, clicks, share, lost):
+@pytest.mark.parametrize(
+    ("share", "code", "lost", "exits"),
+    [
+        (1.0, "", 0, 0),
+        (0.95, "damaged-recording", 1, 0),
+        (0.5, "radar-missing", 9, 3),
+        (0.3, "radar-mostly-missing", 15, 3),
+        (0.125, "radar-mostly-missing", 18, None),
+    ],
+)
+def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(
+    sample, tmp_path, clicks, share, code, lost, exits
+):
     whole = (sample / "radar.bag").read_bytes()
     (tmp_path / "radar.bag").write_bytes(whole[: int(share * len(whole))])
     with open_recording([tmp_path / "radar.bag", sample / "camera.bag"]) as cut:
@@ -116,12 +129,56 @@ def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(s
     verdict = verdict_on(outcome)
 
     leading = outcome.suspected if isinstance(outcome, Unsolvable) else (verdict.cause,)
-    assert [one.facts["lost"] for one in leading if one and one.code == "damaged-recording"] == [lost] * (lost > 0)
+    assert [(one.code, one.facts["lost"]) for one in leading if one] == [(code, lost)] * (lost > 0)
     assert not lost or verdict.action == FollowHint()
+    if isinstance(outcome, Calibration):
+        assert (verdict.level == "contradictory") == (code == "radar-mostly-missing")
+        assert exit_code(verdict.level, None, None, outcome.warnings) == exits
+        assert not {"few-pairs", "no-consensus"} & {one.code for one in outcome.warnings}
     if text:
         damage = read_calibration(text).provenance.damage
         assert any("could not be parsed" in one for one in damage) == (lost > 0)
         assert ("damage" in json.loads(text)["provenance"]) == (lost > 0)
+
+
+@pytest.mark.parametrize(
+    ("without", "touched", "share", "damaged", "code"),
+    [
+        (5, 5, 0.0, False, ""),
+        (6, 6, 0.0, False, "radar-missing"),
+        (10, 10, 0.0, True, "radar-missing"),
+        (11, 11, 0.0, False, "radar-mostly-missing"),
+        (0, 0, 0.05, True, ""),
+        (0, 0, 0.06, True, "damaged-recording"),
+        (0, 0, 0.06, False, ""),
+        (0, 1, 0.0, True, "damaged-recording"),
+    ],
+)
+def test_lost_data_are_told_by_clicks_and_by_their_share(without, touched, share, damaged, code):
+    damage = DataWarning.reported("not-closed", "the end is missing", "copy it again") if damaged else None
+    warning = lost_data(clicks=20, without=without, touched=touched, share=share, damage=damage)
+    assert (warning.code if warning else "") == code
+
+
+def test_a_gap_within_a_damaged_recording_touches_the_click_in_it(tmp_path, recording, clicks):
+    scans = recording.radar_scans()
+    gone = np.abs(scans.times_ns - int(clicks[4].image_time)) < 10**9
+
+    def messages() -> Iterator[RecordedMessage]:
+        for number in np.flatnonzero(~gone).tolist():
+            scan = scans.scan(number)
+            values = np.column_stack([scan.points_radar_m, scan.doppler_mps])
+            body = CloudMessage(scan.time, "radar", ("x", "y", "z", "doppler_mps"), values)
+            yield RecordedMessage("/radar", scan.time, body)
+
+    camera = next(path for path in recording.paths if path.name == "camera.bag")
+    whole = write_ros1_bag(tmp_path / "radar.bag", messages())
+    for path, touched in ((whole, None), (tmp_path / "cut.bag", 1)):
+        path.write_bytes(whole.read_bytes()[: None if touched is None else -300])
+        with open_recording([camera, path]) as changed:
+            outcome = solve_clicks(changed, clicks, recording.camera(), CalibrationOptions())
+        lost = [one.facts["lost"] for one in outcome.warnings if one.code == "damaged-recording"]
+        assert lost == ([] if touched is None else [touched])
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -5,6 +5,7 @@ import zipfile
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
@@ -12,8 +13,9 @@ from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.interchange.own.raw_data import for_raw
 from calib_core.radar import AngleMap
+from calib_core.words.verdict import StatedVerdict
 from cocalib.web.channel import export_preview as panel
-from cocalib.web.exports import format_rows
+from cocalib.web.exports import FieldError, format_rows
 
 
 def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
@@ -34,6 +36,17 @@ def test_the_evidence_is_said_with_the_verdict(file):
         ("imported_proven", "proved"),
     ):
         assert words in panel.export_preview(replace(file, evidence=evidence), "tf2", "", "drive").evidence
+
+
+def test_a_contradictory_calibration_is_shown_and_written_only_on_request(file):
+    assert not panel.export_preview(file, "tf2", "", "drive").asks_despite_verdict
+    doubted = replace(file, verdict=StatedVerdict("contradictory", "two poses fit", "measure the camera position"))
+    assert panel.export_preview(doubted, "tf2", "", "drive").asks_despite_verdict
+    with pytest.raises(FieldError) as refusal:
+        panel.exported(doubted, "tf2", "")
+    assert refusal.value.field == "despite_verdict"
+    assert "verdict: contradictory" in panel.exported(doubted, "tf2", "despite_verdict=1").content
+    assert panel.exported(doubted, "json", "").content, "our own format states the verdict"
 
 
 def test_a_format_without_the_angle_map_says_so_with_both_figures(file):
