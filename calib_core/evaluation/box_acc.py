@@ -30,6 +30,10 @@ AXES: dict[Axis, tuple[float, float, float]] = {
 }
 """The camera's own axes: x right, y down, z forward."""
 
+_MOST_DEG = 16.0
+_STEPS_DEG = (2.0, 1.0, 0.5, 0.25)  # towards the top of a curve, once it is inside
+_LOW = 0.25  # Acc in all of a curve says nothing of where its top is
+_NORMAL_95 = 1.96
 _CHANCE_DEG = 10.0
 _GROUPS_S = (1.0, 2.0, 5.0, 10.0)
 _LEAST_GROUPS = 6
@@ -121,10 +125,10 @@ def frame_groups(image_times: TimesNs, length_s: float) -> Indices:
 
 
 def grouped_error(values: Values, image_times: TimesNs) -> tuple[float, int]:
-    """Return the standard error of the mean of one value per frame, and the number of groups that it comes from.
+    """Return the standard error of the mean of one value per frame, and the number of independent groups of frames.
 
     Neighbouring frames show the same targets, so they are taken together: the largest of the errors with groups of 1, 2, 5
-    and 10 s that leave enough groups. NaN below two groups.
+    and 10 s that leave enough groups. As many groups count as the longest of these leave, whatever the values. NaN below two.
 
     Args:
         values: (f,).
@@ -138,8 +142,7 @@ def grouped_error(values: Values, image_times: TimesNs) -> tuple[float, int]:
             break
         sums = np.bincount(group, weights=values - values.mean())
         error = float(np.sqrt(groups / (groups - 1) * (sums**2).sum()) / len(values))
-        if not error <= best:
-            best, count = error, groups
+        best, count = error if not error <= best else best, groups
     return best, count
 
 
@@ -166,14 +169,79 @@ def _sensitivity(
 ) -> tuple[Sensitivity, ...]:
     curves = []
     for number, (name, axis) in enumerate(AXES.items()):
-        accs = []
-        for step, angle in enumerate(ANGLES_DEG):
-            pixels = seen_pixels(_turn_points(points_camera_m, np.array(axis), angle), camera)
-            accs.append(_mean_share(inside_own_boxes(pixels, counted.boxes_px), counted.frames))
-            if progress is not None:
-                progress(number * len(ANGLES_DEG) + step + 1, len(AXES) * len(ANGLES_DEG))
-        curves.append(Sensitivity(name, ANGLES_DEG, tuple(accs), standard_error))
+        curve = _Curve(points_camera_m, camera, counted, np.array(axis))
+        curve.search()
+        low, high = curve.interval_deg()
+        angles = tuple(sorted(curve.shares))
+        accs = tuple(curve.acc(angle) for angle in angles)
+        curves.append(Sensitivity(name, angles, accs, standard_error, low, high))
+        if progress is not None:
+            progress(number + 1, len(AXES))
     return tuple(curves)
+
+
+class _Curve:
+    """Acc of a calibration turned about one axis, as far as its top.
+
+    Attributes:
+        shares: (f,) of each frame, by angle [deg].
+    """
+
+    def __init__(self, points_camera_m: Points3, camera: Camera, counted: CountedReturns, axis: Vector3) -> None:
+        self._points_camera_m, self._camera, self._counted, self._axis = points_camera_m, camera, counted, axis
+        self.shares: dict[float, Values] = {}
+
+    def acc(self, angle_deg: float) -> float:
+        """Return Acc at an angle."""
+        return float(self._at(angle_deg).mean())
+
+    def _at(self, angle_deg: float) -> Values:
+        if angle_deg not in self.shares:
+            pixels = seen_pixels(_turn_points(self._points_camera_m, self._axis, angle_deg), self._camera)
+            inside = inside_own_boxes(pixels, self._counted.boxes_px)
+            self.shares[angle_deg] = _shares(inside, self._counted.frames)[0]
+        return self.shares[angle_deg]
+
+    @property
+    def top_deg(self) -> float:
+        """The angle at which Acc is highest; of several, the one nearest to 0."""
+        return max(self.shares, key=lambda angle: (self.acc(angle), -abs(angle)))
+
+    def search(self) -> None:
+        """Widen the angles until the top is inside, or at most 16 deg away, and then step towards it."""
+        reach_deg = max(map(self._known, ANGLES_DEG))
+        while reach_deg < _MOST_DEG:
+            top = self.top_deg
+            if abs(top) < reach_deg and self.acc(top) >= _LOW:
+                break
+            for side in (-1.0, 1.0) if self.acc(top) < _LOW else (np.sign(top),):
+                for factor in (1.5, 2.0):
+                    self._at(float(side * factor * reach_deg))
+            reach_deg *= 2.0
+        if reach_deg == max(ANGLES_DEG):
+            return
+        for step in _STEPS_DEG:
+            top = self.top_deg
+            for near in (top - step, top + step):
+                self._at(float(np.clip(near, -_MOST_DEG, _MOST_DEG)))
+
+    def _known(self, angle_deg: float) -> float:
+        self._at(angle_deg)
+        return angle_deg
+
+    def interval_deg(self) -> tuple[float, float]:
+        """Return the nearest angles on either side of the top at which Acc is clearly lower, by pairs of frames (95 %)."""
+        rows = np.unique(self._counted.frames)
+        times, best = self._counted.image_times[rows], self._at(self.top_deg)
+
+        def is_lower(angle: float) -> bool:
+            apart = best - self.shares[angle]
+            return bool(apart.mean() > _NORMAL_95 * grouped_error(apart, times)[0])
+
+        angles = sorted(self.shares)
+        below = [angle for angle in angles if angle < self.top_deg and is_lower(angle)]
+        above = [angle for angle in angles if angle > self.top_deg and is_lower(angle)]
+        return max(below, default=-np.inf), min(above, default=np.inf)
 
 
 def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -> float:

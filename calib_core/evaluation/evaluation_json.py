@@ -117,7 +117,15 @@ def _boxes(figures: BoxFigures) -> dict[str, Any]:
         "targets": figures.targets,
         "matched_targets": figures.matched_targets,
         "sensitivity": [
-            {"axis": one.axis, "angles_deg": list(one.angles_deg), "acc": list(one.acc), "flat": one.is_flat}
+            {
+                "axis": one.axis,
+                "angles_deg": list(one.angles_deg),
+                "acc": list(one.acc),
+                "flat": one.is_flat,
+                "best_deg": one.best_deg,
+                "low_deg": one.low_deg,
+                "high_deg": one.high_deg,
+            }
             for one in figures.sensitivity
         ],
         "classes": [dataclasses.asdict(one) for one in figures.classes],

@@ -203,12 +203,16 @@ class Sensitivity:
         angles_deg: ascending, 0 among them.
         acc: Acc at each angle, 0 to 1.
         standard_error: of Acc at 0; smaller changes may be chance. NaN if unknown.
+        low_deg: the nearest angle below the best one at which Acc is clearly lower (95 %); -inf if it is at none.
+        high_deg: the same above it; inf likewise.
     """
 
     axis: Axis
     angles_deg: tuple[float, ...]
     acc: tuple[float, ...]
     standard_error: float = float("nan")
+    low_deg: float = float("-inf")
+    high_deg: float = float("inf")
 
     @property
     def is_flat(self) -> bool:

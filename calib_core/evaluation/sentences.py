@@ -68,9 +68,11 @@ def _sensitivity_sentence(curve: Sensitivity) -> str:
         return (
             f"Acc is flat in {curve.axis}: it cannot see it ({_percent(min(curve.acc))} to {_percent(max(curve.acc))})"
         )
-    best = curve.best_deg
+    best, interval = curve.best_deg, ""
+    if np.isfinite([curve.low_deg, curve.high_deg]).all():
+        interval = f"; {curve.low_deg:+g} to {curve.high_deg:+g} deg with 95 %"
     ends = f"{_percent(at[low])} at {low:+g} deg, {_percent(at[high])} at {high:+g} deg"
-    highest = f", highest at {best:+g} deg ({_percent(max(curve.acc))}), not here"
+    highest = f", highest at {best:+g} deg ({_percent(max(curve.acc))}{interval}), not here"
     where = highest if max(curve.acc) - at[0.0] >= _CLEARLY_HIGHER else ""
     return f"Acc under {curve.axis}: {_percent(at[0.0])} here, {ends}{where}"
 

@@ -1,5 +1,7 @@
 """What judging a calibration on a recording says: a row for each code of its warnings."""
 
+import numpy as np
+
 from calib_core.measurements import Unpaired
 from calib_core.words.remark import Remark, by_code, remark
 from calib_core.words.unpaired import unpaired_remark
@@ -62,11 +64,22 @@ def no_target_in_a_box(*, targets: int | None = None) -> Remark:
     )
 
 
-def turned_from_boxes(*, turned_deg: float) -> Remark:
+_ELSE = {
+    "yaw": "the radar's azimuths, or the match of targets and boxes",
+    "pitch": "the radar's elevations, or what of an object it sees",
+    "roll": "the radar's elevations",
+}
+_POSITIVE = {"yaw": "to the left", "pitch": "downwards", "roll": "counterclockwise, seen from behind"}
+
+
+def turned_from_boxes(
+    *, axis: str, turned_deg: float, low_deg: float = float("nan"), high_deg: float = float("nan")
+) -> Remark:
+    ends = f", {low_deg:+.3g} to {high_deg:+.3g} deg with 95 %" if np.isfinite([low_deg, high_deg]).all() else ""
     return remark(
-        f"targets and boxes agree best with a camera turned by {turned_deg:+.0f} deg from the calibration about the vertical "
-        "(positive to the left)",
-        "the calibration, or the match of targets and boxes, is wrong; look at the overlay",
+        f"targets and boxes agree best with the calibration's camera turned in {axis} by {turned_deg:+.3g} deg (positive "
+        f"{_POSITIVE[axis]}{ends})",
+        f"{axis} of the calibration is wrong, or {_ELSE[axis]}; look at the overlay",
     )
 
 

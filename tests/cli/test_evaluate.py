@@ -92,7 +92,10 @@ def test_acc_is_never_alone_and_a_calibration_that_looks_elsewhere_is_doubted(co
     answer = cocalib("evaluate", matrix_file(tmp_path / "away.txt", 10.0), *on_it)
     assert answer.code == 3
     assert answer.out.startswith("Acc: 0.")
-    assert "a camera turned by" in answer.out
+    assert "turned in yaw by" in answer.out
+    quiet = cocalib("evaluate", matrix_file(tmp_path / "near.txt", 2.5), *on_it, "--json")
+    assert quiet.code == 3
+    assert "turned in yaw by" in quiet.err
 
 
 def test_the_json_has_the_documented_keys(cocalib, folder):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
+from calib_core.words.outcomes import said_of
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, NO_ANSWER, Required, exit_code
 from cocalib.cli.flags import OUTPUT, File, Output, OutputFlags, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
@@ -107,6 +108,9 @@ class Evaluate:
             print_exactly(
                 evaluation_json(evaluation, calibration=self.calibration.name, recording=names, exit_code=code)
             )
+            stated = [] if verdict is None else [f"stored verdict: {verdict.line}"]
+            for line in [*stated, *(f"warning: {said_of(warning)}" for warning in evaluation.warnings)]:
+                print(line, file=sys.stderr)
             return code
         if evaluation is not None:
             print("\n".join(evaluation_lines(evaluation)))

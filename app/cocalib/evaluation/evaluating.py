@@ -12,7 +12,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.evaluation.box_acc import judged_by_boxes
 from calib_core.evaluation.counted_returns import CountedReturns, counted_returns, longest_gap_s
-from calib_core.evaluation.figures import Evaluation
+from calib_core.evaluation.figures import BoxFigures, Evaluation
 from calib_core.evaluation.moving_returns import TargetOptions
 from calib_core.evaluation.residuals import AssociatedPairs, associated_pairs, residual_figures
 from calib_core.evaluation.target_tracking import LONGEST_STEP_S, find_targets
@@ -24,7 +24,11 @@ _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
 
 _DOUBTFUL = frozenset({"other-lens", "no-target-in-a-box", "turned-from-boxes", "mostly-moving"})
-_TURNED_RAD = np.deg2rad(4.0)
+_TURNED_DEG = 1.0
+"""Beyond two standard deviations: what boxes are off by, as of returns that are not in the middle of their objects."""
+_BEARINGS_DEG = 4.0
+_ENOUGH_ACC = 0.25
+_ABOUT = {"pitch": 0, "yaw": 1, "roll": 2}
 
 
 class RadarRecording(RadarSource, Protocol):
@@ -176,7 +180,7 @@ def judged(
     if evidence.returns is not None:
         pose, lens = calibration.camera_from_radar, calibration.camera
         boxes = judged_by_boxes(pose, lens, evidence.returns, radar_errors=calibration.radar_errors, progress=progress)
-        warnings += _turned_warnings(calibration, evidence.returns)
+        warnings += _turned_warnings(calibration, evidence.returns, boxes)
     return Evaluation(residuals, boxes, tuple(warnings))
 
 
@@ -288,13 +292,25 @@ def _warnings_on(returns: CountedReturns) -> tuple[DataWarning, ...]:
     return ()
 
 
-def _turned_warnings(calibration: Calibration, returns: CountedReturns) -> list[DataWarning]:
-    """Warn if targets and boxes agree on another direction than the calibration."""
+def _turned_warnings(calibration: Calibration, returns: CountedReturns, boxes: BoxFigures) -> list[DataWarning]:
+    """Warn if targets and boxes agree on another direction than the calibration: by Acc, or by bearings where Acc is too low."""
+    ends = {
+        curve.axis: (curve.best_deg, curve.low_deg, curve.high_deg) for curve in boxes.sensitivity if not curve.is_flat
+    }
+    tops = {curve.axis: max(curve.acc) for curve in boxes.sensitivity if curve.axis in ends}
+    highest = max(tops, key=lambda axis: tops[axis], default=None)
+    if highest is not None and tops[highest] >= _ENOUGH_ACC:
+        turned, low, high = ends[highest]
+        sigma_deg = np.rad2deg(np.sqrt(np.nan_to_num(np.diag(calibration.covariance)[3:])))[_ABOUT[highest]]
+        within = np.hypot(turned - low if turned > 0 else high - turned, 2.0 * sigma_deg)
+        if abs(turned) <= _TURNED_DEG + within:
+            return []
+        return [
+            DataWarning("turned-from-boxes", {"axis": highest, "turned_deg": turned, "low_deg": low, "high_deg": high})
+        ]
     if returns.bearings is None:
         return []
     ahead = calibration.camera_from_radar.rotation @ np.array([1.0, 0.0, 0.0])
     expected = -float(np.arctan2(ahead[0], ahead[2]))
-    off = (returns.bearings.turn_rad - expected + np.pi) % (2.0 * np.pi) - np.pi
-    if abs(off) < _TURNED_RAD:
-        return []
-    return [DataWarning("turned-from-boxes", {"turned_deg": float(np.rad2deg(off))})]
+    off = float(np.rad2deg((expected - returns.bearings.turn_rad + np.pi) % (2.0 * np.pi) - np.pi))
+    return [DataWarning("turned-from-boxes", {"axis": "yaw", "turned_deg": off})] if abs(off) >= _BEARINGS_DEG else []

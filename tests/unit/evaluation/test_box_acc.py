@@ -7,10 +7,10 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation.box_acc import grouped_error, judged_by_boxes
+from calib_core.evaluation.box_acc import AXES, grouped_error, judged_by_boxes
 from calib_core.evaluation.counted_returns import counted_returns, renamed_classes
 from calib_core.evaluation.target_tracking import moving_targets
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import (
     NS_PER_S,
     Box,
@@ -268,6 +268,28 @@ def test_the_standard_error_takes_neighbouring_frames_together():
     assert grouped_error(alone, times)[0] == pytest.approx(1.0 / np.sqrt(400), rel=0.6)
     assert grouped_error(in_tens, times)[0] == pytest.approx(1.0 / np.sqrt(20), rel=0.5)
     assert np.isnan(grouped_error(alone[:5], times[:5])[0])
+
+
+def test_groups_are_counted_by_the_frames_alone():
+    times = np.arange(135) * NS_PER_S // 2
+    rng = np.random.default_rng(3)
+    counts = {grouped_error(rng.normal(size=135) * scale, times)[1] for scale in (0.0, 1.0) for _ in range(20)}
+    assert counts == {7}, "of 10 s, in 67 s"
+
+
+@pytest.mark.parametrize(
+    ("axis", "deg"), [("yaw", 5.0), ("yaw", -9.0), ("pitch", 2.5), ("pitch", -6.0), ("roll", 6.0), ("yaw", 0.0)]
+)
+def test_a_turned_calibration_is_found_with_its_axis_its_size_and_an_interval(crowd, axis, deg):
+    turn_rad = np.deg2rad(deg) * np.array(AXES[axis])
+    pose = RigidTransform(rotation_exp(turn_rad), np.zeros(3)) @ TRUE_POSE
+    found = {one.axis: one for one in box_figures(pose, CAMERA, crowd.scans, crowd.boxes).sensitivity}
+    highest = max(found.values(), key=lambda one: max(one.acc))
+    if deg:
+        assert highest.axis == axis
+    assert found[axis].best_deg == pytest.approx(-deg, abs=1.5 if axis == "roll" else 0.5)
+    assert found[axis].low_deg < -deg < found[axis].high_deg
+    assert abs(found[axis].best_deg) < max(map(abs, found[axis].angles_deg))
 
 
 def test_boxes_of_another_recording_are_refused(crowd):
