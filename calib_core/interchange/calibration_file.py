@@ -21,7 +21,7 @@ Label = Annotated[str, Meta(extra_json_schema={"minLength": 1, "maxLength": MOST
 
 
 class VehicleNote(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Which vehicle the calibration is of, and the serials of its sensors.
+    """Which vehicle the calibration is of, the serials of its sensors, and where its radar is.
 
     Attributes:
         name: of the vehicle.
@@ -29,6 +29,8 @@ class VehicleNote(msgspec.Struct, frozen=True, omit_defaults=True):
         session: name of the session, such as a date.
         radar_serial: of the radar.
         camera_serial: of the camera.
+        frame: the vehicle's frame, in which the returns were recorded before they were taken back to the radar.
+        radar_mount: pose of the radar in it that this rests on: x, y, z [m], roll, pitch, yaw [deg] as of a URDF's origin.
 
     Raises:
         InputError: a text is empty, too long or not printable, or a name has a slash; the message begins with the key.
@@ -39,10 +41,12 @@ class VehicleNote(msgspec.Struct, frozen=True, omit_defaults=True):
     session: Label | None = None
     radar_serial: Label | None = None
     camera_serial: Label | None = None
+    frame: Label | None = None
+    radar_mount: tuple[float, float, float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
         for key, text in asdict(self).items():
-            if text is not None:
+            if isinstance(text, str):
                 (require_name if key in ("name", "session") else require_label)(text, f"vehicle.{key}")
 
     def over(self, other: "VehicleNote") -> "VehicleNote":

@@ -333,7 +333,7 @@ def _refuse_another_sensor(frame: str) -> None:
     """
     if _OTHER_NAME.search(frame):
         raise InputError(
-            f"{frame!r} is no radar by its name; if it is the radar's frame, say so with --radar-frame {frame}, or rename it; "
+            f"{frame!r} is no radar by its name; if it is the radar's frame, say so with --radar {frame}, or rename it; "
             "else give the pose of the radar as well"
         )
 

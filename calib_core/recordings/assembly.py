@@ -10,6 +10,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream, frames_of_one_size, image_stream, video_warnings
 from calib_core.recordings.camera.images import ImageLayout
@@ -19,12 +20,12 @@ from calib_core.recordings.checks import (
     claim_warnings,
     image_warnings,
     lost_message_warnings,
-    radar_frame_warnings,
     radar_warnings,
     without_certain_zone,
 )
 from calib_core.recordings.containers.sources import Assumption, Source, assumption_warnings
 from calib_core.recordings.field_words import parse_column_map
+from calib_core.recordings.frame_transforms import recorded_mount
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.plain_files.file_stamps import COUNTED
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
@@ -33,6 +34,7 @@ from calib_core.recordings.radar.column_plan import StatedReading, parse_radar_a
 from calib_core.recordings.radar.layouts import layouts_of_parts
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
+from calib_core.recordings.radar.returns_origin import SAMPLED_SCANS, ReturnsOrigin, mount_of, named_origin, origin_of
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
 from calib_core.recordings.selection import (
@@ -75,6 +77,7 @@ class Assembly:
     confirmed: bool
     column_map: tuple[str, ...]
     radar_late_s: float
+    returns_origin: ReturnsOrigin | None
 
     @property
     def used(self) -> frozenset[str]:
@@ -129,7 +132,9 @@ def assemble(
     used = used.readable(stamped)
     clocks, stamps, about_choice = _clocks(used, stamped, inventory, options, before)
     warnings.extend([*lost, *choice.warnings, *about_choice])
-    radar = _radar_stream(used, choice, inventory, stamps, stamped)
+    parts = [_topic_stream(topic, inventory, stamps[topic.name], stamped[topic.name].heads) for topic in used.radars]
+    origin = before.returns_origin if before is not None else _returns_origin(parts, topics, options)
+    radar = _radar_stream(parts, choice, None if origin is None else origin.moved_by)
     images, about_sizes = frames_of_one_size(_image_stream(used.image, inventory, stamps))
     if before is not None:
         return replace(before, radar=radar, images=images)
@@ -151,8 +156,7 @@ def assemble(
             *video_warnings(images),
         ]
     )
-    radar_frame = _frame(used.radars[0]) if used.radars else ""
-    warnings.extend(radar_frame_warnings(used.radars[0].name, radar_frame) if used.radars else [])
+    warnings.extend(() if origin is None else origin.warnings)
     assumptions = without_certain_zone(_assumptions(sources, used, radar), radar, images)
     unconfirmed = () if options.confirm_assumptions else assumptions
     warnings.extend(assumption_warnings(unconfirmed))
@@ -164,7 +168,7 @@ def assemble(
         image_choice=image_choice(inventory, selection.image, options.image_topic),
         image_topic=used.image.name if used.image else None,
         camera_info_topic=used.camera_info.name if used.camera_info else str(beside.file) if beside else None,
-        radar_frame=radar_frame,
+        radar_frame="" if origin is None else origin.frame if origin.moved_by is None else origin.radar_frame,
         camera_frame=_frame(used.image) or _frame(used.camera_info),
         radar=radar,
         images=images,
@@ -174,6 +178,7 @@ def assemble(
         confirmed=options.confirm_assumptions,
         column_map=tuple(one.words for one in stated.column_map),
         radar_late_s=options.radar_late,
+        returns_origin=origin,
     )
 
 
@@ -329,15 +334,31 @@ def _times(both: Stamps, clock: str) -> TimesNs:
     return np.where(missing, both.receive_ns - delay, both.header_ns)
 
 
+def _returns_origin(
+    parts: Sequence[RadarStream], topics: Sequence[Topic], options: RecordingOptions
+) -> ReturnsOrigin | None:
+    """Judge whose frame the returns of the radar in use are in; None without one."""
+    if not parts:
+        return None
+    topic, frame, stated = parts[0].topic, _frame(parts[0].topic), options.radar_mount
+    body = named_origin(frame) == "body" or options.radar_frame == "body"
+    if stated is not None and not np.isfinite(stated).all():
+        raise RecordingError(
+            f"--radar-mount {' '.join(map(str, stated))}: give x y z in metres, then roll pitch yaw in degrees"
+        )
+    mounted = (
+        (mount_of(stated), "") if stated is not None else recorded_mount(topics, frame, radar=topic.name, body=body)
+    )
+    mount, radar_frame = mounted or (None, "")
+    scans = parts[0].sample(SAMPLED_SCANS)
+    return origin_of(scans, frame, mount, radar_frame=radar_frame, stated=options.radar_frame)
+
+
 def _radar_stream(
-    used: _Used,
-    choice: RadarChoice,
-    inventory: Inventory,
-    stamps: Mapping[str, TimesNs],
-    stamped: Mapping[str, StampedTopic],
+    parts: Sequence[RadarStream], choice: RadarChoice, mount: RigidTransform | None
 ) -> RadarStream | MergedStream | None:
-    """Build the stream of the radar in use, of one topic or of several."""
-    parts = [_topic_stream(topic, inventory, stamps[topic.name], stamped[topic.name].heads) for topic in used.radars]
+    """Build the stream of the radar in use, of one topic or of several, as seen from its mount if that is given."""
+    parts = [part if mount is None else part.seen_from(mount) for part in parts]
     repeats = list(choice.sensors[0].repeats) if choice.sensors else list(range(len(parts)))
     for index, part in enumerate(tuple(parts)):
         others = other_azimuths(part)

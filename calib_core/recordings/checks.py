@@ -22,9 +22,6 @@ _FEW = 5
 _MIN_ANGLE_RAD = 0.02
 _MIRROR = "--radar-axes forward,right,up"
 _SAMPLED_SCANS = 12
-_VEHICLE_FRAMES = frozenset(
-    {"base_link", "base_footprint", "base", "body", "car", "chassis", "ego", "ego_vehicle", "rear_axle", "vehicle"}
-)
 _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
 _HOURS_S = range(-14 * 3600, 14 * 3600 + 1, 3600)
 
@@ -277,18 +274,6 @@ def radar_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning
             )
         )
     return warnings
-
-
-def radar_frame_warnings(name: str, frame: str) -> list[DataWarning]:
-    """Warn if a radar's frame has the name of a vehicle's: its noise, scales and biases are polar about the radar.
-
-    Args:
-        name: of the topic.
-        frame: its frame_id.
-    """
-    if frame.lower().rpartition("/")[2] not in _VEHICLE_FRAMES:
-        return []
-    return [DataWarning("radar-in-vehicle-frame", {"topic": name, "frame": frame})]
 
 
 def image_warnings(images: ImageStream | None) -> list[DataWarning]:

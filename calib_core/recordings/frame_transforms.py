@@ -1,6 +1,8 @@
 """The transforms between coordinate frames in a recording: /tf_static, and what does not move in /tf."""
 
-from collections.abc import Iterator, Sequence
+import contextlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,13 +10,18 @@ import numpy as np
 
 from calib_core.arrays import Vector3, freeze
 from calib_core.errors import MessageError, RecordingError
+from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.radar.returns_origin import named_origin
+from calib_core.recordings.selection import RADAR_WORDS
 from calib_core.recordings.topics import Topic, join_topics
 
 _TYPES = ("TFMessage", "tfMessage")
 _MOST_MESSAGES = 3000
 """Of one topic: /tf may have millions, and whether a joint moves shows in evenly spaced ones."""
+_MOST_STATIC = 100
+"""Likewise, where only a radar's mount is looked for."""
 _STILL = 1e-6
 
 
@@ -41,6 +48,11 @@ class FrameTransform:
     def __post_init__(self) -> None:
         freeze(self, translation_m=(3,), quaternion_xyzw=(4,))
 
+    @property
+    def pose(self) -> RigidTransform:
+        """Of the child in the parent."""
+        return RigidTransform(matrix_from_quaternion_wxyz(self.quaternion_xyzw[[3, 0, 1, 2]]), self.translation_m)
+
 
 def frame_transforms(paths: Sequence[Path]) -> tuple[FrameTransform, ...]:
     """Read the transforms between frames of a recording, static topics first; nothing if it has none.
@@ -54,12 +66,7 @@ def frame_transforms(paths: Sequence[Path]) -> tuple[FrameTransform, ...]:
     sources = open_sources(paths)
     try:
         names = {channel.topic for source in sources for channel in source.channels if channel.type.endswith(_TYPES)}
-        topics, _ = join_topics(sources, names)
-        found: dict[tuple[str, str], FrameTransform] = {}
-        for topic in sorted(topics, key=_is_moving):
-            for transform in _transforms(topic):
-                _add(found, transform)
-        return tuple(found.values())
+        return _transforms_of(join_topics(sources, names)[0], _MOST_MESSAGES)
     except MessageError as error:
         raise RecordingError(f"{paths[0]}: {error}") from error
     finally:
@@ -67,12 +74,68 @@ def frame_transforms(paths: Sequence[Path]) -> tuple[FrameTransform, ...]:
             source.close()
 
 
+def recorded_mount(topics: Sequence[Topic], frame: str, *, radar: str, body: bool) -> tuple[RigidTransform, str] | None:
+    """Return the pose of a radar in the body frame, and the name of the radar's own frame; None if it is not known.
+
+    Args:
+        topics: of the recording.
+        frame: frame_id of the returns.
+        radar: the radar's topic, whose name tells which of several radars it is.
+        body: whether the returns are said to be in the body frame; then what does not move in /tf counts too.
+    """
+    published = [topic for topic in topics if topic.type.endswith(_TYPES) and len(topic)]
+    kinds = [[topic for topic in published if not _is_moving(topic)], published if body else []]
+    for some, most in zip(kinds, (_MOST_STATIC, _MOST_MESSAGES), strict=True):
+        with contextlib.suppress(RecordingError, ValueError):  # damaged, or a quaternion that is none
+            above = {one.child: one for one in _transforms_of(some, most) if not one.moves}
+            below = "" if _is_radar(frame) else _radar_below(above, frame, radar)
+            poses = dict(_poses_above(above, below or frame))
+            named = [one for one in poses if named_origin(one) == "body"]
+            base = frame if below else named[0] if named else next(reversed(poses), "")
+            if base in poses and (below or named_origin(frame) != "body"):
+                return poses[base], below or frame
+    return None
+
+
+def _is_radar(frame: str) -> bool:
+    return any(word in frame.lower() for word in RADAR_WORDS)
+
+
+def _radar_below(above: Mapping[str, FrameTransform], frame: str, radar: str) -> str:
+    """Return the frame below the body's that is named as a radar, of several the one most like the topic; "" if none is."""
+    below = {one: tuple(dict(_poses_above(above, one))) for one in above if _is_radar(one)}
+    carriers = {carrier for carried in below.values() for carrier in carried}
+    found = [one for one, carried in below.items() if frame in carried and one not in carriers]
+    words = set(re.findall(r"[a-z]+|\d+", radar.lower()))
+    alike = [len(words & set(re.findall(r"[a-z]+|\d+", one.lower()))) for one in found]
+    best = [one for one, score in zip(found, alike, strict=True) if score == max(alike)]
+    return best[0] if len(best) == 1 else ""
+
+
+def _poses_above(above: Mapping[str, FrameTransform], frame: str) -> Iterator[tuple[str, RigidTransform]]:
+    """Yield each frame that carries another one, and the pose of this in it, from its parent to the root."""
+    pose, seen = RigidTransform.identity(), {frame}
+    while (joint := above.get(frame)) is not None and joint.parent not in seen:
+        pose, frame = joint.pose @ pose, joint.parent
+        seen.add(frame)
+        yield frame, pose
+
+
+def _transforms_of(topics: Sequence[Topic], most: int) -> tuple[FrameTransform, ...]:
+    """Read the transforms of at most so many messages of each topic."""
+    found: dict[tuple[str, str], FrameTransform] = {}
+    for topic in sorted(topics, key=_is_moving):
+        for transform in _transforms(topic, most):
+            _add(found, transform)
+    return tuple(found.values())
+
+
 def _is_moving(topic: Topic) -> bool:
     return not topic.name.endswith("static")
 
 
-def _transforms(topic: Topic) -> Iterator[FrameTransform]:
-    rows = np.unique(np.linspace(0, len(topic) - 1, min(len(topic), _MOST_MESSAGES)).astype(np.int64))
+def _transforms(topic: Topic, most: int) -> Iterator[FrameTransform]:
+    rows = np.unique(np.linspace(0, len(topic) - 1, min(len(topic), most)).astype(np.int64))
     for row in rows.tolist():
         for stamped in topic.message(row).messages("transforms"):
             yield _transform(stamped, topic.name)
@@ -81,8 +144,8 @@ def _transforms(topic: Topic) -> Iterator[FrameTransform]:
 def _transform(stamped: Message, topic: str) -> FrameTransform:
     place = "transform.translation", "transform.rotation"
     return FrameTransform(
-        stamped.message("header").text("frame_id"),
-        stamped.text("child_frame_id"),
+        stamped.message("header").text("frame_id").lstrip("/"),
+        stamped.text("child_frame_id").lstrip("/"),
         np.array([stamped.number(f"{place[0]}.{axis}") for axis in "xyz"]),
         np.array([stamped.number(f"{place[1]}.{axis}") for axis in "xyzw"]),
         topic,

@@ -30,6 +30,7 @@ from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.column_plan import ColumnReading, column_readings, parse_radar_axes
 from calib_core.recordings.radar.merging import MergedStream
+from calib_core.recordings.radar.returns_origin import ReturnsOrigin
 from calib_core.recordings.radar.scan_stream import Losses
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.recording_file import RecordingFile, recording_file_of, with_recording_file
@@ -190,17 +191,23 @@ class Recording:
     @property
     def radar_notes(self) -> tuple[str, ...]:
         """What else the user should know about the radar's messages, as sentences without their final periods."""
-        return (*self.radar_clock_notes, *(self._assembly.radar.layout.plan.notes if self._assembly.radar else ()))
+        return (*self.radar_option_notes, *(self._assembly.radar.layout.plan.notes if self._assembly.radar else ()))
 
     @property
-    def radar_clock_notes(self) -> tuple[str, ...]:
-        """What the user's --radar-late does, as a sentence without its final period; empty if it is not given."""
+    def returns_origin(self) -> ReturnsOrigin | None:
+        """Whose frame the radar's returns are in; None without a radar."""
+        return self._assembly.returns_origin
+
+    @property
+    def radar_option_notes(self) -> tuple[str, ...]:
+        """What --radar-late and the radar's mount do, as sentences without their final periods."""
         late_s = self._assembly.radar_late_s
         side, change = ("late", "reduced") if late_s > 0 else ("early", "increased")
         words = (
             f"the radar's stamps are {abs(late_s):.9g} s too {side}, and {change} by that (--radar-late {late_s:.9g})"
         )
-        return (words,) if late_s else ()
+        origin = self.returns_origin
+        return (*((words,) if late_s else ()), *(() if origin is None else origin.notes))
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:

@@ -16,7 +16,7 @@ from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.results import InputFile
 
 RECORDING_FILE = "recording.toml"
-_KEYS = ("radar_topic", "image_topic", "camera_info_topic", "clock", "map", "radar_late")
+_KEYS = ("radar_topic", "image_topic", "camera_info_topic", "clock", "map", "radar_late", "radar_frame", "radar_mount")
 _NEEDS: Mapping[str, Need] = {"radar_topic": "radar", "image_topic": "image", "camera_info_topic": "image"}
 _MOST_BYTES = 1 << 16
 
@@ -31,7 +31,7 @@ class RecordingFile:
     """
 
     file: InputFile
-    used: Mapping[str, str | float | tuple[str, ...]]
+    used: Mapping[str, Any]
 
     @property
     def words(self) -> str:
@@ -97,5 +97,5 @@ def recording_file_text(options: RecordingOptions) -> str:
     return "".join(f"{key} = {_toml(value)}\n" for key, value in stated)
 
 
-def _toml(value: str | float | tuple[str, ...]) -> str:
+def _toml(value: str | float | tuple[str | float, ...] | None) -> str:
     return json.dumps(value, ensure_ascii=False)

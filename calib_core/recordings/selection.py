@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -33,9 +33,11 @@ _NOTHING = StatedReading()
 _ENOUGH_BYTES = 16
 _MOST_NAMES = 8
 Need = Literal["radar", "image"]
+Mount: TypeAlias = tuple[float, float, float, float, float, float]
+"""x, y, z [m], roll, pitch, yaw [deg]."""
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
 _FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--camera-info-topic"}
-_RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii")
+RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii")
 _OBJECT_WORDS = ("object", "track")
 _MOST_RADARS = 12  # that are compared
 _ADDED_BY_EXPORT = "/cocalib/"
@@ -225,6 +227,16 @@ class RecordingOptions:
         0.0,
         "By how many seconds the radar's stamps are too late, which are reduced by it; negative if they are too early.",
     )
+    radar_frame: Literal["sensor", "body"] | None = option(
+        None,
+        "Whose frame the radar's returns are in: its own, or the body's (base_link), out of which its mount takes them back; by "
+        "default, as their frame_id and the returns themselves say.",
+    )
+    radar_mount: Mount | None = option(
+        None,
+        "Pose of the radar in the body frame: x y z [m], roll pitch yaw [deg], as of a URDF's origin; by default that of "
+        "/tf_static.",
+    )
     no_recording_file: bool = option(False, "Ignore a recording.toml beside the recording.")
 
 
@@ -400,7 +412,7 @@ def radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
     layout = inventory.usages[topic.name].radar
     assert layout is not None
     name = f"{topic.name} {topic.type}".lower()
-    named = any(word in name for word in _RADAR_WORDS)
+    named = any(word in name for word in RADAR_WORDS)
     return (
         not layout.lidar_like or named,
         layout.plan.doppler is not None or bool(layout.plan.velocity),

@@ -760,17 +760,29 @@ def lost_returns(*, lost: int, read: int, where: str) -> Remark:
     )
 
 
-def radar_in_vehicle_frame(*, topic: str, frame: str) -> Remark:
-    """Given when the frame_id of the returns is a vehicle's, such as base_link: they seem to have been moved out of the radar's
-    own frame.
+def radar_in_vehicle_frame(*, frame: str, by_name: str, by_data: str, mounted: bool, stated: bool) -> Remark:
+    """Given when the returns may have been moved out of the radar's frame into a vehicle's, such as base_link, and are not taken
+    back: its frame_id and the returns themselves contradict each other or cannot tell, or the radar's mount is not known.
 
     Could also be: returns in the radar's frame under another's name.
     """
+    said = {
+        "sensor": "measured at the origin of their frame, so in the radar's own",
+        "body": "measured at the radar's mount, so moved into the vehicle's frame",
+        "unknown": "of no certain origin",
+    }
+    name = "" if by_name == "unknown" else f"by its name {'a vehicle' if by_name == 'body' else 'the radar'}'s; "
+    seen = "as stated a vehicle's" if stated else f"{name}by the returns themselves they are {said[by_data]}"
+    by_body = say("{frame} {mount}", frame=option("radar_frame", "body"), mount=option("radar_mount"))
     return remark(
-        f"{topic} is in the frame '{frame}', by its name a vehicle's: the pose would be that of this frame, and its uncertainty "
-        "is too small, since the radar's noise and angle errors are about the radar's own place and axes",
-        "record the returns in the radar's own frame, before the driver or converter moves them; if only the name is wrong, "
-        "correct the frame_id",
+        f"the returns are in the frame '{frame}', {seen}; if they are in a vehicle's, the pose is that of this frame, and its "
+        "uncertainty is too small: the radar's noise and angle errors are about the radar's own place and axes",
+        say(
+            "if they are in the vehicle's frame, they are taken back with {body}; if they are in the radar's own, say {sensor}",
+            body=option("radar_frame", "body") if mounted else by_body,
+            sensor=option("radar_frame", "sensor"),
+        ),
+        SetOption("radar_frame") if mounted else SetOption("radar_mount"),
     )
 
 

@@ -212,7 +212,7 @@ _TABLE = [
     ),
     (2, "export good.json --to opencv --rectified", "rectified"),
     (2, "export good.json --to autoware --parent-from-radar 0 0 0 0 0 0 2", "qw last"),
-    (2, "export good.json --to tf2 --radar-frame a$b", "use a name without"),
+    (2, "export good.json --to tf2 --radar a$b", "use a name without"),
     (2, "export good.json --to all", "--out"),
     (2, "export good.json --to all --out empty", "--to all needs a folder: --out FOLDER"),
     (2, "export good.json --to all --out empty/inside", "empty"),

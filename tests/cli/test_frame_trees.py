@@ -67,8 +67,8 @@ def test_import_names_the_flags_and_chains_what_they_choose(car, project_root, t
     arguments = ["import", str(car), "--out", str(out), "--camera", str(camera)]
 
     assert run(arguments) == 2
-    assert "--radar-frame NAME and --camera-frame" in capsys.readouterr().err
-    assert run([*arguments, "--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]) == 3
+    assert "--radar NAME and --camera-frame" in capsys.readouterr().err
+    assert run([*arguments, "--radar", "radar_front", "--camera-frame", "camera_front_link"]) == 3
     file = read_calibration(out.read_text(encoding="utf-8"))
     assert (file.frames.radar, file.frames.camera) == ("radar_front", "camera_front_optical_frame")
     assert [one.name for one in file.provenance.inputs] == ["car.urdf"]
@@ -99,7 +99,7 @@ def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path
     assert run([*arguments, "--write"]) == 0
     assert car.read_bytes() == (tmp_path / "copy.urdf").read_bytes()
     capsys.readouterr()
-    frames = ["--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]
+    frames = ["--radar", "radar_front", "--camera-frame", "camera_front_link"]
     assert run(["check", str(car), "--against", str(calibration), *frames]) == 0
     assert run([*arguments, "--to", "urdf"]) == 2
     assert "give one of them" in capsys.readouterr().err
@@ -124,7 +124,7 @@ def test_into_keeps_mode_and_owner_and_refuses_a_read_only_file(calibration, car
 def test_into_respects_the_drivers_chain_of_a_recording(calibration, recording, tmp_path):
     cart = tmp_path / "cart.urdf"
     cart.write_text(vehicles.REALSENSE_URDF, encoding="utf-8")
-    frames = ["--radar-frame", "radar", "--camera-frame", "camera_color_optical_frame"]
+    frames = ["--radar", "radar", "--camera-frame", "camera_color_optical_frame"]
 
     assert run(["export", str(calibration), "--into", str(cart), "--tree", str(recording), *frames, "--write"]) == 0
     expected = read_calibration(calibration.read_text(encoding="utf-8")).calibration.camera_from_radar
@@ -148,7 +148,7 @@ def test_a_static_transform_leads_to_the_root_of_the_drivers_chain(calibration, 
 
 def test_frames_are_renamed_and_the_origin_stays(calibration, capsys):
     original, hashes = read_any(calibration.read_bytes()), []
-    for names in ([], ["--radar-frame", "bumper_radar", "--camera-frame", "cam0_optical"]):
+    for names in ([], ["--radar", "bumper_radar", "--camera-frame", "cam0_optical"]):
         assert run(["export", str(calibration), "--to", "tf2", *names]) == 0
         text = capsys.readouterr().out
         hashes.append(re.findall(r"sha256 (\w+)", text))

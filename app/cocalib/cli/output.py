@@ -47,6 +47,8 @@ _FLAGS = {
     "radar_axes": "--radar-axes",
     "clock": "--clock",
     "radar_late": "--radar-late",
+    "radar_frame": "--radar-frame",
+    "radar_mount": "--radar-mount",
     "solving.camera_position": "--camera-position-m",
 }
 
@@ -153,11 +155,13 @@ def tell_choices(recording: "Recording", *, but: str = "") -> None:
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
+    from calib_core.words.outcomes import in_sentences
     from calib_core.words.warnings import warning_remark
 
-    _tell_notes(recording.radar_clock_notes)
     doubted = [warning for warning in recording.warnings if warning.code in _OF_FRAMES and warning.code != but]
-    _tell_notes([str(warning_remark(warning).message) for warning in (*doubted, *recording.damage)])
+    _tell_notes(recording.radar_option_notes)
+    _tell_notes([on_terminal(in_sentences(warning)) for warning in doubted])
+    _tell_notes([str(warning_remark(warning).message) for warning in recording.damage])
 
 
 def _tell_notes(notes: Sequence[str]) -> None:

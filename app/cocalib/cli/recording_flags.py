@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
@@ -47,6 +47,12 @@ class TopicFlags(RecordingOptions):
     time_zone: Annotated[str | None, called("OFFSET")] = same(RecordingOptions, "time_zone")
     radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
     radar_late: Annotated[float, called("SECONDS")] = same(RecordingOptions, "radar_late")
+    radar_frame: Annotated[Literal["sensor", "body"] | None, called("{sensor,body}")] = same(
+        RecordingOptions, "radar_frame"
+    )
+    radar_mount: Annotated[tuple[float, float, float, float, float, float] | None, called("X Y Z ROLL PITCH YAW")] = (
+        same(RecordingOptions, "radar_mount")
+    )
     no_recording_file: Annotated[bool, called()] = same(RecordingOptions, "no_recording_file")
 
     def open(self, paths: Sequence[Path], require: "Sequence[Need]" = ("radar", "image")) -> "Recording":

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 class FrameFlags:
     """The names of the two frames."""
 
-    radar_frame: Annotated[str | None, called("NAME")] = None
+    radar: Annotated[str | None, called("NAME")] = None
     """The radar's frame: which one of a frame tree with several, or what to call it."""
     camera_frame: Annotated[str | None, called("NAME")] = None
     """The camera's frame: which one of a frame tree with several, or what to call it."""
@@ -41,7 +41,7 @@ class FrameFlags:
         """What the user names."""
         from calib_core.interchange.trees.frame_choice import WantedFrames
 
-        return WantedFrames(self.radar_frame, self.camera_frame)
+        return WantedFrames(self.radar, self.camera_frame)
 
     def files(self, paths: Sequence[Path]) -> "tuple[TreeFile, ...] | None":
         """Return the content of a calibration's files, each read once; None if they are a recording.
@@ -87,7 +87,7 @@ class FrameFlags:
         from calib_core.interchange.own.calibration_json import calibration_sha256
 
         known = file.frames
-        frames = FrameNames(self.radar_frame or known.radar, self.camera_frame or known.camera)
+        frames = FrameNames(self.radar or known.radar, self.camera_frame or known.camera)
         if frames == known:
             return file
         return dataclasses.replace(file, frames=frames, made_from_sha256=calibration_sha256(file))

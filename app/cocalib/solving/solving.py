@@ -15,7 +15,14 @@ from calib_core.calibration import calibrate_pairs, calibration_steps, solve_aga
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
 from calib_core.input_files import name_text, text_of
-from calib_core.interchange.calibration_file import AssumptionNote, CalibrationFile, FrameNames, Provenance, VehicleNote
+from calib_core.interchange.calibration_file import (
+    MOST_CHARACTERS,
+    AssumptionNote,
+    CalibrationFile,
+    FrameNames,
+    Provenance,
+    VehicleNote,
+)
 from calib_core.interchange.cameras.files import CameraFile
 from calib_core.interchange.own.calibration_json import calibration_text as interchange_text
 from calib_core.interchange.own.calibration_json import read_calibration
@@ -26,6 +33,7 @@ from calib_core.measurements import NS_PER_S, Candidate, DataWarning, ReflectorC
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, RecordingOptions, assumption_warnings
 from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.radar.returns_origin import mount_numbers
 from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import lost_data, lost_returns
@@ -346,11 +354,20 @@ def calibration_text(
         column_map=recording.column_map,
         assumptions=(
             *(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
-            *(AssumptionNote(note, True) for note in recording.radar_clock_notes),
+            *(AssumptionNote(note, True) for note in recording.radar_option_notes),
         ),
         unconfirmed=unconfirmed,
     )
-    return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)
+    return interchange_text(calibration, _frame_names(recording), provenance, vehicle=_mounted(recording, vehicle))
+
+
+def _mounted(recording: Recording, vehicle: VehicleNote | None) -> VehicleNote | None:
+    """Add the vehicle's frame, and the mount that returns were taken back by."""
+    origin = recording.returns_origin
+    if origin is None or origin.moved_by is None:
+        return vehicle
+    named = VehicleNote(frame=origin.frame[:MOST_CHARACTERS] or None, radar_mount=mount_numbers(origin.moved_by))
+    return named.over(vehicle or VehicleNote())
 
 
 def _input_file(source: str, data: bytes) -> InputFile:

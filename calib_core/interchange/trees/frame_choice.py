@@ -50,7 +50,7 @@ def choose_frames(tree: FrameTree, wanted: WantedFrames, *, source: str) -> Chos
     Raises:
         InputError: a name is not in the tree, or there is not exactly one radar and one camera; the message lists them.
     """
-    radars = (_frame_text(tree, wanted.radar, "--radar-frame", source),) if wanted.radar else _radars_in(tree)
+    radars = (_frame_text(tree, wanted.radar, "--radar", source),) if wanted.radar else _radars_in(tree)
     if wanted.camera:
         named = _frame_text(tree, wanted.camera, "--camera-frame", source)
         cameras = _optical_below(tree, named) or (named,)
@@ -73,7 +73,7 @@ def _ambiguity(tree: FrameTree, radars: Sequence[str], cameras: Sequence[str]) -
     for names, kind in ((radars, "radar"), (cameras, "camera")):
         if len(names) == 1:
             continue
-        flags.append(f"--{kind}-frame NAME")
+        flags.append("--radar NAME" if kind == "radar" else "--camera-frame NAME")
         found.append(f"{len(names)} {kind} frames: {_frame_list(names)}" if names else f"no frame named like a {kind}")
     rest = "" if radars and cameras else f" (its frames: {tree.listed()})"
     hint = f"; {tree.hint}" if tree.hint and not (radars and cameras) else ""
@@ -138,7 +138,7 @@ def _is_same(tree: FrameTree, above: str, below: str) -> bool:
     return bool(np.abs(tree.between(above, below).as_matrix() - np.eye(4)).max() <= _SAME)
 
 
-def _frame_text(tree: FrameTree, name: str, flag: Literal["--radar-frame", "--camera-frame"], source: str) -> str:
+def _frame_text(tree: FrameTree, name: str, flag: Literal["--radar", "--camera-frame"], source: str) -> str:
     wanted = name.strip().lstrip("/")
     if wanted in tree.frames:
         return wanted

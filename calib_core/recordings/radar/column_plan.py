@@ -10,6 +10,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix33
 from calib_core.errors import MessageError, OptionError
+from calib_core.geometry import RigidTransform
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import MAPPED_UNITS, MappedColumn
 
@@ -175,6 +176,7 @@ class ColumnPlan:
         covariance: an array with the position's covariance [m^2], or None.
         claimed: columns of range, azimuth and elevation, whether or not the position is made of them; to find contradictions.
         axes: the user's axes and units; None if not given.
+        mount: pose of the radar in the frame that the positions are given in; None if they are in the radar's own.
         decoder: the layout's name in the registry; "" if the message is read by its column names alone.
         shared_with_lidars: whether lidars have the same columns.
         claiming: whether to fill in Returns.claimed_polar.
@@ -207,6 +209,7 @@ class ColumnPlan:
     covariance: str | None = None
     claimed: tuple[str | None, str | None, str | None] = (None, None, None)
     axes: RadarAxes | None = None
+    mount: RigidTransform | None = None
     decoder: str = ""
     shared_with_lidars: bool = False
     claiming: bool = False
@@ -226,7 +229,8 @@ class ColumnPlan:
     @property
     def is_plain_xyz(self) -> bool:
         """Return whether the position is that of columns x, y and z, in metres, forward, left and up."""
-        unchanged = (self.axes, self.azimuth_from, self.scales, self.directions) == (
+        unchanged = (self.axes, self.mount, self.azimuth_from, self.scales, self.directions) == (
+            None,
             None,
             None,
             _NO_SCALES,

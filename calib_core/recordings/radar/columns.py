@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Values
+from calib_core.arrays import Flags, Points3, Values, Vector3
+from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar.column_plan import ColumnPlan, plain_name
 
@@ -156,7 +157,7 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
         position = _at_other_azimuth(plan, position, _floats(column(plan.azimuth_from)))
     n = len(position)
     amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
-    doppler = _doppler(plan, column, position)
+    doppler = _doppler(plan, column, position if plan.mount is None else position - _origin_m(plan, plan.mount))
     for flag in plan.spoils_doppler:
         doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
     lost = ~(np.abs(position) <= _FARTHEST_M).all(axis=1)
@@ -170,6 +171,8 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     turn = plan.turn
     if turn is not None:
         position = position @ turn.T
+    if plan.mount is not None:
+        position = plan.mount.inverse() @ position
     if plan.amplitude_scale != 1.0:
         amplitude = amplitude * plan.amplitude_scale
     claimed = _columns(plan.claimed, column, n) * plan.claimed_scales if plan.claiming else None
@@ -177,6 +180,11 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     amplitude = np.where(np.isinf(amplitude), np.nan, amplitude) if np.isinf(amplitude).any() else amplitude
     sigma = _sigma(plan, column, position)
     return Returns(position, doppler, amplitude, sigma, claimed, lost if lost.any() else None)
+
+
+def _origin_m(plan: ColumnPlan, mount: RigidTransform) -> Vector3:
+    """Return where the radar is (3,) [m], in the message's own axes."""
+    return mount.translation_m if plan.turn is None else plan.turn.T @ mount.translation_m
 
 
 def _floats(values: np.ndarray) -> Values:
@@ -216,6 +224,7 @@ def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Poin
     turn = plan.turn
     if plan.covariance is not None:
         covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
+        turn = turn if plan.mount is None else plan.mount.rotation.T @ (np.eye(3) if turn is None else turn)
         return sigma_polar_from_covariance(position, covariance if turn is None else turn @ covariance @ turn.T)
     if not any(plan.sigma):
         return unknown(len(position), 3)

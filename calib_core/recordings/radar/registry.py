@@ -344,7 +344,7 @@ def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> Col
     plan = plan_for(kind, names)
     if plan is None:
         return None
-    plan = replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from)
+    plan = replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from, mount=first.mount)
     return plan.read_as(first.axes) if first.axes else plan
 
 

@@ -7,11 +7,13 @@ from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from calib_core.arrays import Points3, TimesNs, frozen_array
 from calib_core.errors import MessageError, RecordingError
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.radar.columns import Returns, no_returns
 from calib_core.recordings.radar.layouts import RadarLayout
@@ -180,8 +182,15 @@ class RadarStream(ScanBlocks):
 
     def at_azimuth(self, column: str) -> "RadarStream":
         """Return the same scans with the returns at another azimuth that the messages give for each."""
+        return self._with_plan(azimuth_from=column)
+
+    def seen_from(self, mount: RigidTransform) -> "RadarStream":
+        """Return the same scans with the returns in the frame of a radar, given its pose in the frame that they are in."""
+        return self._with_plan(mount=mount)
+
+    def _with_plan(self, **changes: Any) -> "RadarStream":
         other = copy.copy(self)
-        other.layout, *rest = (layout.with_plan(replace(layout.plan, azimuth_from=column)) for layout in self._layouts)
+        other.layout, *rest = (layout.with_plan(replace(layout.plan, **changes)) for layout in self._layouts)
         other._layouts = (other.layout, *rest)
         other._read_of, other._lost_of = np.zeros((2, len(self.topic)), dtype=np.int32)
         ScanBlocks.__init__(other, self.times_ns)
@@ -247,7 +256,8 @@ class RadarStream(ScanBlocks):
 
     def claims(self, count: int) -> Returns:
         """Decode ranges and angles as given, and positions in the message's own axes, of at most count scans."""
-        layout = self.layout.with_plan(replace(self.layout.plan, claiming=True, axes=None))
+        plan = self.layout.plan
+        layout = self.layout.with_plan(replace(plan, claiming=True, axes=plan.axes if plan.mount else None))
         places = np.unique(np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns))).astype(np.int64))
         first, last = self._first[places], np.minimum(self._last[places], self._first[places] + _CLAIMS_OF_A_SCAN)
         rows = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in zip(first, last, strict=True))])

@@ -296,14 +296,18 @@ def test_a_scale_of_zero_is_refused(solved):
 # Which vehicle a calibration is of, in its file.
 
 
-FULL = VehicleNote("V017", "van", "2026-09-21", "R-0417", "C-\u00fc12")
+FULL = VehicleNote("V017", "van", "2026-09-21", "R-0417", "C-\u00fc12", "base_link", (3.7, 0.0, 0.6, 0.0, -1.5, 45.0))
 KEYS = list(VehicleNote.__struct_fields__)
 GOLDEN = (Path(__file__).resolve().parents[2] / "golden/calibration-1.json").read_text(encoding="utf-8")
 
 _LABELS = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=MOST_CHARACTERS)
 _NAMES = _LABELS.filter(lambda text: text.strip(".") and not set(text) & set("/\\"))
+_NUMBERS = st.floats(-180.0, 180.0).map(lambda value: value + 0.0)
+_TEXTS = [key for key in KEYS if key != "radar_mount"]
 _NOTES = st.builds(
-    VehicleNote, **{key: st.none() | (_NAMES if key in ("name", "session") else _LABELS) for key in KEYS}
+    VehicleNote,
+    radar_mount=st.none() | st.tuples(*[_NUMBERS] * 6),
+    **{key: st.none() | (_NAMES if key in ("name", "session") else _LABELS) for key in _TEXTS},
 )
 
 
@@ -316,6 +320,7 @@ def with_vehicle(vehicle: object) -> str:
 def test_any_note_is_read_back_and_goes_before_what_a_file_says(one, other):
     text = write_calibration(replace(read_calibration(GOLDEN), vehicle=one))
     stated = {key: value for key in KEYS if (value := getattr(one, key)) is not None}
+    stated |= {key: list(value) for key, value in stated.items() if isinstance(value, tuple)}
     assert json.loads(text).get("vehicle", {}) == stated
     assert ("vehicle" in json.loads(text)) == bool(stated)
     assert read_calibration(text).vehicle == one
@@ -355,7 +360,7 @@ def test_an_invalid_value_is_refused_by_every_reader(vehicle, fault):
         assert str(error.value).startswith(f"mine.json: {fault}")
 
 
-@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("key", _TEXTS)
 @pytest.mark.parametrize("value", ["", " ", "x" * 121, "a\x00", "\ud800"])
 def test_a_note_that_no_file_can_hold_cannot_be_made(key, value):
     with pytest.raises(InputError, match=rf"^vehicle\.{key} is "):

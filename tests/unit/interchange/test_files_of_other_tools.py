@@ -309,7 +309,7 @@ def _published(parent: str, child: str, position: list[float]) -> str:
 def test_the_camera_in_the_vehicle_or_another_sensor_is_not_taken_for_the_radars(other):
     text = _published(other, "camera_optical", POSITION)
     assert f"{other!r} is no radar" in refusal(text)
-    assert f"--radar-frame {other}" in refusal(text)
+    assert f"--radar {other}" in refusal(text)
     named = read_any(text, "file", WantedFrames(other))
     np.testing.assert_allclose(named.pose.as_written().translation_m, POSITION)
     transform = {

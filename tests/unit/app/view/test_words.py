@@ -160,7 +160,10 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("radar-axes-suspected", {"side": "left", "behind": 3, "pairs": 9}),
     DataWarning("repeated-placements", {"pairs": 9, "places": 4}),
     DataWarning("residuals-too-large", {"chi2_per_degree": 9.0}),
-    DataWarning("radar-in-vehicle-frame", {"topic": "/radar_points", "frame": "base_link"}),
+    DataWarning(
+        "radar-in-vehicle-frame",
+        {"frame": "base_link", "by_name": "body", "by_data": "unknown", "mounted": False, "stated": False},
+    ),
     DataWarning("placement-ranges", {"chosen": 3, "by_score": 17, "region_m": 1.0}),
     DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),
     DataWarning("shared-error-suspected", {"angle": "azimuth", "slope_deg_per_m": 0.11, "slope_sigma_deg_per_m": 0.02}),

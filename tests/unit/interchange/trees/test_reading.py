@@ -72,7 +72,7 @@ def test_several_radars_and_cameras_are_listed_with_the_flags_that_choose(tmp_pa
     message = refusal(paths)
     assert "frames: radar_front, radar_rear_left" in message
     assert "frames: camera_front_optical_frame, camera_rear_optical_frame" in message
-    assert "--radar-frame NAME and --camera-frame" in message
+    assert "--radar NAME and --camera-frame" in message
     assert "did you mean radar_front?" in refusal(paths, radar="radr_front")
     moving = refusal(paths, radar="radar_front", camera="wheel_left")
     assert "/car.urdf:11: " in moving
