@@ -43,7 +43,8 @@ class ImageRecording:
     assumptions: tuple[Any, ...] = ()
     stated_assumptions: tuple[Any, ...] = ()
     column_map: tuple[str, ...] = ()
-    radar_clock_notes: tuple[str, ...] = ()
+    radar_option_notes: tuple[str, ...] = ()
+    returns_origin: Any = None
     radar_columns: tuple[Any, ...] = ()
     radar_notes: tuple[str, ...] = ()
     image_names: tuple[str, ...] = ()

@@ -126,9 +126,14 @@ def test_a_radar_topic_that_is_not_read_has_its_reason(cocalib, cases, name, wor
     assert words in topic["problem"]
 
 
-def test_returns_that_a_driver_has_moved_into_the_vehicles_frame_are_named(cocalib, cases, sample, tmp_path):
+def test_returns_that_a_driver_has_moved_into_the_vehicles_frame_are_taken_back_by_the_mount(
+    cocalib, cases, sample, tmp_path
+):
     bags = (cases / "16-returns-in-base-link" / "radar.bag", sample / "camera.bag")
     assert "radar-in-vehicle-frame" in cocalib("info", *bags).out
-    answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", tmp_path / "c.json")
-    assert "'base_link'" in answer.err
+    solve = ("solve", *bags, "--clicks", sample / "clicks.json", "--out", tmp_path / "c.json")
+    answer = cocalib(*solve)
+    assert "'base_link'" in answer.out
     assert "verdict: coarse" in answer.out
+    assert "verdict: usable" in cocalib(*solve, "--radar-mount", *["3.7", "0", "0.6", "0", "0", "0"]).out
+    assert error_of(tmp_path / "c.json", sample) < (0.15, 1.5)

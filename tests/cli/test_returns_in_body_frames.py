@@ -71,10 +71,10 @@ def test_returns_are_taken_back_by_the_bags_own_transforms(cocalib, published, s
 def test_without_transforms_the_mount_is_asked_for_and_given(cocalib, published, sample, tmp_path):
     radar, out = published("base_link", moved=True, transforms=False), tmp_path / "c.json"
     solve = ("solve", radar, sample / "camera.bag", "--clicks", sample / "clicks.json")
-    answer = cocalib(*solve)
-    assert json.loads(answer.out)["verdict"]["level"] == "coarse"
-    assert "--radar-frame body --radar-mount" in answer.err
-    assert "--radar-frame sensor" in answer.err
+    answer = cocalib(*solve, "--out", out)
+    assert json.loads(out.read_text())["verdict"]["level"] == "coarse"
+    assert "--radar-frame body --radar-mount" in answer.out
+    assert "--radar-frame sensor" in answer.out
     assert cocalib(*solve, "--out", out, *FLAGS).code == 0
     assert json.loads(out.read_text())["verdict"]["level"] in ("good", "usable")
     assert error_of(out, sample)[0] < 0.1
