@@ -760,15 +760,18 @@ def lost_returns(*, lost: int, read: int, where: str) -> Remark:
     )
 
 
-def radar_in_vehicle_frame(*, frame: str, by_name: str, by_data: str, mounted: bool, stated: bool) -> Remark:
+def radar_in_vehicle_frame(
+    *, frame: str, by_name: str, by_data: str, mounted: bool, stated: bool, place_m: Sequence[float] = ()
+) -> Remark:
     """Given when the returns may have been moved out of the radar's frame into a vehicle's, such as base_link, and are not taken
     back: its frame_id and the returns themselves contradict each other or cannot tell, or the radar's mount is not known.
 
     Could also be: returns in the radar's frame under another's name.
     """
+    place = ", ".join(f"{axis} {value:.2f}" for axis, value in zip("xyz", place_m, strict=False)) + " m" * bool(place_m)
     said = {
         "sensor": "measured at the origin of their frame, so in the radar's own",
-        "body": "measured at the radar's mount, so moved into the vehicle's frame",
+        "body": f"measured at {place or 'the mount of the radar'}, so moved into the vehicle's frame",
         "unknown": "of no certain origin",
     }
     name = "" if by_name == "unknown" else f"by its name {'a vehicle' if by_name == 'body' else 'the radar'}'s; "

@@ -8,6 +8,9 @@ measured at the origin of their frame, and at the mount of the radar in it, by t
 * sides: an antenna sees what is in front of it, or it turns and sees everything;
 * Doppler: while the vehicle moves, the speeds of what stands still are one velocity along the lines of sight from the radar.
 
+Where no mount is known, or it explains nothing, the place is looked for: two neighbouring returns in one bin of range are equally
+far from it, so it is on the plane between them.
+
 The nearest return and the sector of bearings are shown, and decide nothing: a scene may be empty near the radar.
 """
 
@@ -16,7 +19,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values
+from calib_core.arrays import Points3, Values, Vector3
 from calib_core.geometry import RigidTransform, rotation_from_euler
 from calib_core.measurements import DataWarning, RadarScans
 from calib_core.radar import direction_cosines, polar_from_cartesian
@@ -48,6 +51,14 @@ _FEWEST = 8
 _STEPS = 6
 _LEAST_MPS = 0.02
 """A speed is known no better."""
+_NEAR_M = 0.3
+"""Two returns of one object."""
+_PLANE_M, _WIDE_M = 0.003, 0.3
+"""How near the place a plane passes, of returns in one bin of range, and of those in others: bins are 3 cm or more wide."""
+_FARTHEST_MOUNT_M = 10.0
+_LEAST_DETERMINANT = 0.02
+_TRIES = 400
+_MOST_PAIRED, _MOST_PAIRS = 2000, 4000
 _ELSEWHERE = RigidTransform(np.eye(3), np.array([1.0, 1.0, 0.0]))
 """Where the radar is not, for the bins about the origin to be compared with where no mount is known."""
 
@@ -82,6 +93,7 @@ class ReturnsOrigin:
         mount: pose of the radar in the body frame; None if it is not known.
         radar_frame: the name of the radar's own frame; "" if it is not known.
         log_ratio: logarithm of how much likelier the body frame is than the sensor's.
+        place_m: where their bins say that they were measured, if it is neither the origin nor the mount; None if they do not say.
         figures: about the origin, and about the mount if it is known; none without returns.
     """
 
@@ -91,6 +103,7 @@ class ReturnsOrigin:
     mount: RigidTransform | None = None
     radar_frame: str = ""
     log_ratio: float = 0.0
+    place_m: Vector3 | None = None
     figures: tuple[OriginFigures, ...] = ()
 
     @property
@@ -116,6 +129,7 @@ class ReturnsOrigin:
             "by_data": self.by_data,
             "mounted": self.mount is not None,
             "stated": self.stated is not None,
+            "place_m": () if self.place_m is None else tuple(self.place_m.tolist()),
         }
         return (DataWarning("radar-in-vehicle-frame", facts),)
 
@@ -184,8 +198,12 @@ def origin_of(
         log_ratio = _log_ratio(seen, figures[0], figures[1])
     else:
         log_ratio = min(_bins(_ELSEWHERE @ points, step_m) - figures[0].bins, 0.0)
+    place_m = None
+    if log_ratio > -_SURE and (mount is None or log_ratio < _SURE):
+        place_m, by_place = _measured_at(points, step_m)
+        place_m, log_ratio = (place_m, by_place) if by_place > _SURE else (None, log_ratio)
     by_data: Origin = "unknown" if abs(log_ratio) < _SURE else "body" if log_ratio > 0.0 else "sensor"
-    return ReturnsOrigin(frame, by_data, stated, mount, radar_frame, log_ratio, tuple(figures))
+    return ReturnsOrigin(frame, by_data, stated, mount, radar_frame, log_ratio, place_m, tuple(figures))
 
 
 def _figures(scans: RadarScans, points: Points3, step_m: float) -> OriginFigures:
@@ -229,6 +247,43 @@ def _bins(points: Points3, step_m: float) -> float:
     angles = np.median(range_m) * np.array([np.arctan2(y, x), u])
     polar = _repeats(range_m, step_m) + max(_repeats(values, step_m) for values in angles)
     return polar if polar > _repeats(x, step_m) + _repeats(y, step_m) else 0.0
+
+
+def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
+    """Return the place (3,) from which the most pairs of neighbouring returns are equally far, and the logarithm of how much
+    likelier than by chance that is, less the same of the origin.
+
+    Of a place that a few pairs make, all others meet by chance: of the planes within `_WIDE_M`, a share of `_PLANE_M / _WIDE_M`.
+    """
+    from scipy.spatial import cKDTree
+
+    _, first = np.unique(np.round(points / step_m), axis=0, return_index=True)
+    points = points[first[:: max(1, len(first) // _MOST_PAIRED)]]
+    axes = np.flatnonzero(np.ptp(points, axis=0) > _PLANE_M)  # a radar without elevation has two
+    pairs = cKDTree(points).query_pairs(_NEAR_M, output_type="ndarray")
+    pairs = pairs[:: max(1, len(pairs) // _MOST_PAIRS)]
+    apart = (points[pairs[:, 1]] - points[pairs[:, 0]])[:, axes]
+    long_m = np.linalg.norm(apart, axis=1)
+    pairs, normals = pairs[long_m > 10.0 * _PLANE_M], (apart / long_m[:, None])[long_m > 10.0 * _PLANE_M]
+    grid = min(_repeats(points[:, axis], step_m) for axis in (0, 1))
+    if len(pairs) < _FEWEST or len(axes) < 2 or grid > _SURE:
+        return np.zeros(3), 0.0
+    middles = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])[:, axes]
+    offsets = (normals * middles).sum(axis=1)
+    some = np.random.default_rng(0).integers(len(pairs), size=(_TRIES, len(axes)))
+    some = some[np.abs(np.linalg.det(normals[some])) > _LEAST_DETERMINANT]
+    places = np.linalg.solve(normals[some], offsets[some][:, :, None])[:, :, 0]
+    places = np.concatenate([np.zeros((1, len(axes))), places[np.linalg.norm(places, axis=1) < _FARTHEST_MOUNT_M]])
+    off_m = np.abs(places @ normals.T - offsets)
+    off_m[np.linalg.norm(places[:, None] - middles, axis=2) < 5.0 * _NEAR_M] = np.inf  # near it all pairs are alike
+    each = max(len(pairs) / len(np.unique(pairs)), 1.0)  # the pairs of a cluster repeat each other
+    made_by = np.where(np.arange(len(places)) > 0, len(axes), 0)
+    hits = np.maximum((off_m < _PLANE_M).sum(axis=1) - made_by, 0) / each
+    chance = np.maximum((off_m < _WIDE_M).sum(axis=1) * _PLANE_M / _WIDE_M, 1.0) / each
+    gains = np.where(hits > chance, hits * np.log(np.maximum(hits, chance) / chance) - (hits - chance), 0.0)
+    best, place_m = int(gains.argmax()), np.zeros(3)
+    place_m[axes] = places[best]
+    return place_m, float(gains[best] - gains[0] - np.log(_TRIES))
 
 
 def _repeats(values: Values, step: float) -> float:

@@ -162,7 +162,14 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("residuals-too-large", {"chi2_per_degree": 9.0}),
     DataWarning(
         "radar-in-vehicle-frame",
-        {"frame": "base_link", "by_name": "body", "by_data": "unknown", "mounted": False, "stated": False},
+        {
+            "frame": "base_link",
+            "by_name": "body",
+            "by_data": "unknown",
+            "mounted": False,
+            "stated": False,
+            "place_m": (),
+        },
     ),
     DataWarning("placement-ranges", {"chosen": 3, "by_score": 17, "region_m": 1.0}),
     DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),

@@ -71,7 +71,23 @@ def test_what_the_user_says_decides():
         "by_data": "sensor",
         "mounted": False,
         "stated": True,
+        "place_m": (),
     }
+
+
+@pytest.mark.parametrize("numbers", MOUNTS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_bins_of_moved_returns_show_where_they_were_measured(numbers, seed):
+    scans = scans_of("imaging", seed)
+    found = origin_of(moved(scans, mount_of(numbers)), "radar_front")
+    assert decided(found) == ("body", False, OPEN)
+    assert found.place_m is not None
+    np.testing.assert_allclose(found.place_m, numbers[:3], atol=0.02)
+    for apart in (
+        smooth(scans, np.random.default_rng(1)),
+        moved(smooth(scans, np.random.default_rng(1)), mount_of(numbers)),
+    ):
+        assert origin_of(apart, "radar_front").by_data == "unknown"
 
 
 def smooth(scans: RadarScans, rng: np.random.Generator) -> RadarScans:
