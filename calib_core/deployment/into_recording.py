@@ -20,9 +20,10 @@ from calib_core.radar import RadarErrors
 from calib_core.recordings import Recording
 from calib_core.recordings.containers.copying import CopiedFile, Losses, StoredMessage, copied_file, merged_messages
 from calib_core.recordings.containers.mcap.writing import ChunkCompression, McapWriter
-from calib_core.recordings.containers.sources import ChannelNotes, MessageIndex, StoredChannel
+from calib_core.recordings.containers.sources import Channel, ChannelNotes, MessageIndex, StoredChannel
 from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, MessageBuilder, TransformMessage
 from calib_core.recordings.messages.definitions import with_definition
+from calib_core.recordings.messages.foxglove import ros_message
 from calib_core.recordings.topics import join_topics
 from calib_core.results import Calibration
 from calib_core.words.warnings import warning_remark
@@ -268,7 +269,12 @@ class Additions:
     def _stamp(self, message: StoredMessage) -> bytes:
         """Return an image's own stamp, which its intrinsics must share, in little-endian words."""
         place = self.plan.stamp_offset
-        stamp = b"" if place is None else message.data[place : place + _STAMP.size]
+        stored = message.channel
+        read_as = Channel(
+            0, stored.topic, stored.schema_name, stored.encoding, stored.schema_data.decode("latin-1"), ""
+        )
+        data = ros_message(read_as, message.data)
+        stamp = b"" if place is None else data[place : place + _STAMP.size]
         if len(stamp) < _STAMP.size:
             return _STAMP.pack(*time_parts(stampable(message.log_time)))
         if message.channel.encoding == "cdr" and message.data[1] == 0:

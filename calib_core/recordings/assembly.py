@@ -16,10 +16,12 @@ from calib_core.recordings.camera.image_stream import ImageStream, frames_of_one
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.checks import (
+    camera_frame_warnings,
     check_overlap,
     claim_warnings,
     image_warnings,
     lost_message_warnings,
+    posed_cloud_warnings,
     radar_warnings,
     without_certain_zone,
 )
@@ -157,6 +159,10 @@ def assemble(
         ]
     )
     warnings.extend(() if origin is None else origin.warnings)
+    for topic in used.radars[:1]:
+        warnings.extend(posed_cloud_warnings(topic))
+    if used.image is not None and used.camera_info is not None and camera is not None and beside is None:
+        warnings.extend(camera_frame_warnings(used.camera_info.name, _frame(used.camera_info), _frame(used.image)))
     assumptions = without_certain_zone(_assumptions(sources, used, radar), radar, images)
     unconfirmed = () if options.confirm_assumptions else assumptions
     warnings.extend(assumption_warnings(unconfirmed))

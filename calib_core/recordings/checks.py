@@ -10,13 +10,14 @@ from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.messages.foxglove import pose_target
 from calib_core.recordings.radar.column_guess import forward_axis
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.time.written_times import utc
-from calib_core.recordings.topics import StampedTopic
+from calib_core.recordings.topics import StampedTopic, Topic
 
 _FEW = 5
 _MIN_ANGLE_RAD = 0.02
@@ -274,6 +275,39 @@ def radar_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning
             )
         )
     return warnings
+
+
+def camera_frame_warnings(name: str, frame: str, of_images: str) -> list[DataWarning]:
+    """Warn if the intrinsics are of another frame than the images.
+
+    Args:
+        name: of the topic with the intrinsics.
+        frame: its frame_id.
+        of_images: that of the images.
+    """
+    if not frame or not of_images or frame == of_images:
+        return []
+    return [
+        DataWarning.reported(
+            "camera-frame",
+            f"{name} is of the frame '{frame}', the images are of '{of_images}'",
+            "if it is another camera's, choose the intrinsics with --camera-info-topic or --camera",
+        )
+    ]
+
+
+def posed_cloud_warnings(topic: Topic) -> list[DataWarning]:
+    """Warn if the points of a radar's clouds have a pose of their own: they are read without it, as the radar measured them."""
+    frame = pose_target(*topic.stored(0)) if len(topic) else None
+    if frame is None:
+        return []
+    return [
+        DataWarning.reported(
+            "radar-cloud-posed",
+            f"{topic.name}: its points have a pose in '{frame}', and are read in their own frame, without it",
+            "no action needed if that is the radar's own; the calibration is of this frame, which has no name",
+        )
+    ]
 
 
 def image_warnings(images: ImageStream | None) -> list[DataWarning]:

@@ -7,10 +7,12 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
+from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, Stamp
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Source
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
+from calib_core.recordings.messages.foxglove import HEAD_BYTES, STAMP_BYTES, is_foxglove, ros_head, ros_message
 from calib_core.recordings.time.clock_choice import Stamps
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
 
@@ -130,8 +132,12 @@ class Topic:
 
     def payload(self, row: int) -> bytes:
         """Read one message."""
-        source = self.parts[int(self.part[row])][0]
-        return source.read(int(self.chunk[row]), int(self.offset[row]))
+        return ros_message(*self.stored(row))
+
+    def stored(self, row: int) -> tuple[Channel, bytes]:
+        """Read one message as it is stored, and return its channel."""
+        source, channel = self.parts[int(self.part[row])]
+        return channel, source.read(int(self.chunk[row]), int(self.offset[row]))
 
     def message(self, row: int) -> Message:
         """Read and decode one message."""
@@ -170,6 +176,13 @@ class Topic:
 
 def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: bool = False) -> list[Heads]:
     """Read the first bytes of messages of several topics, file by file; see Source.heads for keep."""
+    if any(is_foxglove(channel) for topic, _ in wanted for _, channel in topic.parts):
+        return [
+            _foxglove_heads(topic, rows, size)
+            if any(is_foxglove(channel) for _, channel in topic.parts)
+            else read_heads([(topic, rows)], size, keep=keep)[0]
+            for topic, rows in wanted
+        ]
     if len(wanted) == 1 and len(wanted[0][0].parts) == 1:
         topic, rows = wanted[0]
         index = MessageIndex(topic.receive_ns[rows], topic.chunk[rows], topic.offset[rows])
@@ -198,6 +211,27 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
             header_columns[number].lengths[mine] = heads.lengths[first:last]
             header_columns[number] = replace(header_columns[number], fault=header_columns[number].fault or heads.fault)
     return header_columns
+
+
+def _foxglove_heads(topic: Topic, rows: np.ndarray, size: int) -> Heads:
+    """Read the first bytes of messages as ROS serialises them: the stamp from their own first bytes, more from all of them."""
+    heads = Heads(np.zeros((len(rows), size), dtype=np.uint8), np.zeros(len(rows), dtype=np.int64))
+    fault = ""
+    for part, (source, channel) in enumerate(topic.parts):
+        mine = np.flatnonzero(topic.part[rows] == part)
+        own = rows[mine]
+        index = MessageIndex(topic.receive_ns[own], topic.chunk[own], topic.offset[own])
+        firsts = source.heads(index, HEAD_BYTES).rows if size <= STAMP_BYTES and is_foxglove(channel) else ()
+        for number, (place, row) in enumerate(zip(mine.tolist(), own.tolist(), strict=True)):
+            head = ros_head(channel, firsts[number].tobytes()) if len(firsts) else None
+            try:
+                head = topic.payload(row) if head is None else head
+            except RecordingError as error:
+                head, fault = None, fault or str(error)
+            heads.lengths[place] = -1 if head is None else len(head)
+            if head is not None:
+                heads.rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
+    return replace(heads, fault=fault)
 
 
 def join_topics(

@@ -19,6 +19,7 @@ from calib_core.recordings.containers.chunks import ChunkedSource
 from calib_core.recordings.containers.sources import Channel, Progress, Source
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
+from calib_core.recordings.messages.foxglove import ros_message
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import LOSSES, Recording
 from calib_core.recordings.summary import FileSummary, files_of
@@ -145,7 +146,7 @@ def _read_channel(source: Source, channel: Channel, check: TopicCheck, reading: 
             check.fault = check.fault or str(error)
             continue
         try:
-            reader.read(payload)
+            reader.read(ros_message(channel, payload))
         except MessageError as error:
             undecodable += 1
             check.fault = check.fault or str(error)

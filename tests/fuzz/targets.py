@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from foxglove import messages as fox
 
 from calib_core.deployment.placing import read_frames
 from calib_core.errors import CalibrationError
@@ -24,9 +25,11 @@ from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, describe, first_image, inspect_recording
 from calib_core.recordings.containers.copying import Losses, copied_file
+from calib_core.recordings.containers.sources import Channel
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import decode
-from calib_core.recordings.messages.definitions import parse_definition
+from calib_core.recordings.messages.definitions import definition_of, parse_definition
+from calib_core.recordings.messages.foxglove import HEAD_BYTES, ros_head, ros_message
 from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import epoch_in_name, read_time
@@ -168,6 +171,34 @@ float32 range  # [m]
 float32 azimuth  # deg
 int16 rcs
 """
+
+
+_SPLIT = b"\0--\0"
+
+
+def _foxglove(data: bytes, _folder: Path) -> None:
+    definition, _, payload = data.partition(_SPLIT)
+    for kind in ("PointCloud", "CompressedImage", "RawImage", "CameraCalibration"):
+        for encoding in ("protobuf", "json"):
+            channel = Channel(0, "/t", f"foxglove.{kind}", encoding, definition.decode("latin-1"), "")
+            _swallow(lambda channel=channel: decode(definition_of(channel), ros_message(channel, payload)))  # type: ignore[misc]
+            ros_head(channel, payload[:HEAD_BYTES])
+
+
+def _foxglove_messages(_folder: Path) -> list[bytes]:
+    kinds = fox.PackedElementFieldNumericType
+    places = [fox.PackedElementField(name=name, offset=4 * i, type=kinds.Float32) for i, name in enumerate("xyz")]
+    stamp = fox.Timestamp(1_700_000_000, 5)
+    every = [
+        fox.PointCloud(timestamp=stamp, frame_id="radar", point_stride=12, fields=places, data=bytes(36)),
+        fox.CompressedVideo(timestamp=stamp, frame_id="camera", format="h264", data=b"\0\0\1\x65"),
+        fox.RawImage(timestamp=stamp, width=2, height=1, encoding="bgr8", step=6, data=bytes(6)),
+        fox.CameraCalibration(timestamp=stamp, width=2, height=1, D=[0.1], K=[1.0] * 9, P=[1.0] * 12),
+    ]
+    written = [type(one).get_schema().data + _SPLIT + one.encode() for one in every]
+    columns = b'"fields":[{"name":"x","offset":0,"type":7}],"point_stride":4,"data":"AAAA"'
+    text = b'{"timestamp":{"sec":1,"nsec":2},"frame_id":"r",' + columns + b"}"
+    return [*written, _SPLIT + text]
 
 
 def _exported(_folder: Path) -> list[bytes]:
@@ -344,6 +375,7 @@ TARGETS: tuple[Target, ...] = (
     _folder_target("bin", ".bin", _fixed(np.array([3, 4, 0, 1, 5, 9, 0.9, 0], "<f4").tobytes(), bytes(28))),
     _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
     Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
+    Target("foxglove", _foxglove, _foxglove_messages, (b'"pose":{', b'"data":"', b"foxglove.")),
     Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported,
            (_MERGE, b"NaN", b"xyzw", b"1e308")),
     Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS, _MERGED),

@@ -7,6 +7,7 @@ from functools import cache
 
 from calib_core.errors import MessageError
 from calib_core.recordings.containers.sources import Channel, Encoding, StoredChannel
+from calib_core.recordings.messages.foxglove import ros_channel
 
 _POINT = "float64 x\nfloat64 y\nfloat64 z\n"
 _RULE = "================\n"
@@ -158,10 +159,12 @@ def definition_of(channel: Channel) -> Definition:
     Raises:
         MessageError: there is none, it cannot be parsed, or the encoding is not a ROS encoding.
     """
+    channel = ros_channel(channel)
     if channel.encoding not in ("ros1", "cdr"):
         raise MessageError(
-            f"topic {channel.topic}: messages are encoded as '{channel.encoding}', but only ros1 and cdr are supported; "
-            "record the topic through ROS, or convert it"
+            f"topic {channel.topic}: messages are encoded as '{channel.encoding}', but only ros1 and cdr are supported, and of "
+            "json and protobuf the images, point clouds and camera calibrations of Foxglove; record the topic through ROS, or "
+            "convert it"
         )
     encoding: Encoding = "ros1" if channel.encoding == "ros1" else "cdr"
     name = short_type(channel.type)

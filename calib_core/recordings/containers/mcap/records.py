@@ -26,6 +26,7 @@ MAX_RECORD_BYTES = 1 << 28
 _CHUNK_HEAD_BYTES = RECORD.size + 40  # without the compression name
 _MAX_INDEX_BYTES = 1 << 26
 _FORMATS = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
+_BINARY = ("protobuf", "flatbuffer")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +37,8 @@ class _Schema:
 
     @property
     def text(self) -> str:
-        """The definition as text."""
-        return self.data.decode("utf-8", "replace")
+        """The definition as text; of a binary one, a character for each byte."""
+        return self.data.decode("latin-1" if self.encoding in _BINARY else "utf-8", "replace")
 
 
 _NO_SCHEMA = _Schema("", "", b"")
