@@ -340,8 +340,11 @@ def _refuse_another_sensor(frame: str) -> None:
 
 _RADAR_NAME = re.compile(r"radar|rdr|mmwave|umrr|ars\d|srr|mrr|lrr", re.IGNORECASE)
 
+_LIDAR = r"lidar|laser|velo(?!c)|livox|ouster|hesai|pandar|robosense|(?<![a-z])(?:ldr|os[012]|vlp|hdl|rs_?16)(?![a-z])"
+_LIDAR_NAME = re.compile(_LIDAR, re.IGNORECASE)
+
 _OTHER_NAME = re.compile(
-    r"base|lidar|laser|velo|livox|ouster|hesai|imu|gps|gnss|novatel|vehicle|chassis|robot|world|\bego|\bmap\b|odom|gripper|tool\d",
+    rf"base|{_LIDAR}|imu|gps|gnss|novatel|vehicle|chassis|robot|world|\bego|\bmap\b|odom|gripper|tool\d",
     re.IGNORECASE,
 )
 
@@ -371,6 +374,16 @@ def _optical_name(camera: str) -> str:
 def looks_like_camera(name: str) -> bool:
     """Return whether a frame name looks like a camera's."""
     return bool(_CAMERA_NAME.search(name))
+
+
+def looks_like_lidar(name: str) -> bool:
+    """Return whether a name looks like a lidar's."""
+    return bool(_LIDAR_NAME.search(name))
+
+
+def of_lidar(name: str) -> str:
+    """Return what is assumed of a pose whose names mention a lidar."""
+    return f"{name!r} names a lidar, not a radar: the pose is taken for the radar's"
 
 
 def looks_like_radar(name: str) -> bool:

@@ -164,3 +164,24 @@ def test_an_expression_is_refused_with_its_line_and_the_numbers(calibration, car
     assert run(["export", str(calibration), "--into", str(car)]) == 2
     words = r'car\.urdf:32: .*its origin is an expression.*Write there by hand: xyz="'
     assert re.search(words, capsys.readouterr().err)
+
+
+def test_poses_in_a_common_frame_are_composed_and_chosen_by_name(tmp_path, capsys):
+    """As Astyx has them, here with two cameras."""
+    optical = np.array([[0.0, -1, 0, 0.2], [0, 0, -1, 1.0], [1, 0, 0, 0.5], [0, 0, 0, 1]])
+    at = {"radar": np.eye(4), "camera_front": np.linalg.inv(optical), "camera_left": np.eye(4)}
+    lens = {"K": [[900, 0, 640], [0, 900, 360], [0, 0, 1]]}
+    sensors = [
+        {"sensor_uid": name, "calib_data": {"T_to_ref_COS": pose.tolist(), **(lens if "cam" in name else {})}}
+        for name, pose in at.items()
+    ]
+    file, out = tmp_path / "000000.json", tmp_path / "c.json"
+    file.write_text(json.dumps({"sensors": sensors}))
+    arguments = ["import", str(file), "--out", str(out), "--image-size", "1280", "720"]
+    assert run(arguments) == 2
+    assert "2 camera frames" in capsys.readouterr().err
+    assert run([*arguments, "--camera", "camera_front", "--radar", "radar"]) == 3
+    document = json.loads(out.read_text())
+    np.testing.assert_allclose(document["camera_from_radar"]["translation_m"], optical[:3, 3], atol=1e-9)
+    assert document["frames"] == {"radar": "radar", "camera": "camera_front"}
+    assert document["evidence"] == "imported_assumed"

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -62,6 +62,17 @@ class MeaningFlags:
         if file is None:
             self._refuse_needless(source)
         return file
+
+    def composed(self, files: "Sequence[TreeFile] | None", frames: FrameFlags) -> "ImportedCalibration | None":
+        """Return what several poses make that name their frames; None if they do not, or one of them is asked for.
+
+        Raises:
+            InputError: a file cannot be read, or several radars or cameras are to choose from.
+        """
+        from calib_core.interchange.hypotheses.composing import read_composed
+
+        asked = self.pose is not None or self.as_ is not None or self.sheet is not None
+        return None if files is None or asked else read_composed(files, frames.wanted)
 
     def chosen(
         self,
@@ -162,10 +173,13 @@ def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
 
 
 def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> None:
-    """Print the hypotheses, how to choose one, and that nothing was written."""
+    """Print the hypotheses, how to choose one, and that nothing was written; first whether its names say lidar."""
+    from calib_core.interchange.format import looks_like_lidar, of_lidar
     from calib_core.interchange.hypotheses.ranking import contradicts_names, likely_ones
 
     shown = likely_ones(hypotheses)
+    if looks_like_lidar(pose.hints.other):
+        print(of_lidar(pose.hints.other))
     print(f"{path.name}: {pose.place} does not state what its numbers mean; they may be:")
     for number, one in enumerate(shown, 1):
         print(f"{number:>3}  {one.key}  ({one.score})\n     {one.words}")
@@ -214,7 +228,7 @@ class Import:
     out: OutFile = None
     """Output file (calibration-1 JSON)."""
     camera: File = None
-    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON; or the camera's frame by name."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
     """Size of the images [px], if the file has a camera matrix but no size; by default that of the images beside it."""
     pairs: File = None
@@ -242,13 +256,17 @@ class Import:
                 "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
             )
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
-        given = read_camera_file(self.camera) if self.camera else None
+        frames, lens = self._frames_and_lens()
+        given = read_camera_file(lens) if lens else None
         against = read_any_file(self.against) if self.against else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
-        files = self.frames.files(self.calibration)
-        unstated = self.meaning.unstated(files, source)
-        if unstated is None or files is None:
-            found, sources = self.frames.read(self.calibration, files)
+        files = frames.files(self.calibration)
+        composed = self.meaning.composed(files, frames)
+        unstated = self.meaning.unstated(files, source) if composed is None else None
+        if composed is not None and files is not None:
+            found, sources = composed, tuple(map(input_file, files))
+        elif unstated is None or files is None:
+            found, sources = frames.read(self.calibration, files)
         else:
             chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
             if chosen is None:
@@ -273,6 +291,18 @@ class Import:
         print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
         level = file.verdict.level if file.verdict else None
         return exit_code(level, file.rests_on, self.require, file.calibration.warnings)
+
+    def _frames_and_lens(self) -> tuple[FrameFlags, Path | None]:
+        """Return the frames that are named, and the file of --camera, which names a frame if it is no file."""
+        if (
+            self.camera is None
+            or self.camera.exists()
+            or self.camera.suffix
+            or self.camera.name != str(self.camera)
+            or self.frames.camera_frame
+        ):
+            return self.frames, self.camera
+        return replace(self.frames, camera_frame=str(self.camera)), None
 
 
 _RESTS_ON = {

@@ -1,11 +1,22 @@
 """KITTI's object calibration, for rectified images; View-of-Delft uses the same keys for its radar."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EVIDENCE_LEVELS, CalibrationFile, Evidence
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
+from calib_core.interchange.format import (
+    Format,
+    ImportedCalibration,
+    Reads,
+    StatedCheckPoint,
+    WrittenPose,
+    looks_like_lidar,
+    of_lidar,
+)
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.interchange.syntax.content import Content
@@ -20,6 +31,8 @@ _SHA256_BYTES, _BYTE_DIGITS = 32, 3
 _ASSUMPTION = "the format names no frames and assumes undistorted images"
 _AED, _FOR_RAW = "cocalib_aed_px", "cocalib_for_raw_aed_px"
 _CHECK_POINT, _EVIDENCE, _SHA256 = "cocalib_check_point", "cocalib_evidence", "cocalib_calibration_sha256"
+_RADAR_FOLDER = re.compile(r"radar(_\dframes)?|.*4dradset.*")
+"""Of View-of-Delft and TJ4DRadSet, where the radar has the Velodyne's key."""
 _POSE_KEYS = ("Tr_velo_to_cam", "Tr_radar_to_cam", "Tr_velo_cam")
 
 
@@ -90,7 +103,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     return ImportedCalibration(
         "kitti",
         written,
-        assumptions=() if check_point else (_ASSUMPTION,),
+        assumptions=() if check_point else (*_of_lidar(key, lines, source), _ASSUMPTION),
         notes=tuple(notes),
         matrix_px=matrix_px,
         check_point=check_point,
@@ -98,6 +111,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         calibration_sha256=_sha256(lines.get(_SHA256, "")),
         for_raw=_FOR_RAW in lines,
     ).checked(source)
+
+
+def _of_lidar(key: str, lines: dict[str, str], source: str) -> tuple[str, ...]:
+    """Return that the pose is a lidar's by its key, unless the file is ours or lies in a radar's folder."""
+    above = [part.lower() for part in Path(source).absolute().parts[:-1]]
+    mine = _EVIDENCE in lines or any(_RADAR_FOLDER.fullmatch(part) for part in above)
+    return () if mine or not looks_like_lidar(key) else (of_lidar(key),)
 
 
 def _check_point(lines: dict[str, str], *, source: str) -> StatedCheckPoint | None:

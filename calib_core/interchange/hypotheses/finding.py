@@ -74,7 +74,9 @@ class _Search:
         names: Sequence[object] | None = None,
     ) -> None:
         if readings and len(self.poses) < _MOST_POSES:
-            self.poses.append(FoundPose(_place(keys), readings, hints_of(keys if names is None else names, texts)))
+            hints = hints_of(keys if names is None else names, texts)
+            said = tuple(str(name) for name in (*texts, *keys) if isinstance(name, str))
+            self.poses.append(FoundPose(_place(keys), readings, hints, said))
 
     def refuse(self, keys: Sequence[object], fault: ValueError) -> None:
         if len(self.unreadable) < _MOST_POSES:

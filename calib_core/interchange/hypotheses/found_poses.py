@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from calib_core.arrays import Matrix33, Vector3, freeze
-from calib_core.interchange.format import Direction, looks_like_camera, looks_like_radar
+from calib_core.interchange.format import Direction, looks_like_camera, looks_like_lidar, looks_like_radar
 
 Part = Literal["rotation", "translation", "other"]
 
@@ -61,7 +61,7 @@ _OF_AXES = {
     "rfu": ("radar", "rfu"),
 }
 _OTHERS = frozenset(
-    {"lidar", "velo", "velodyne", "livox", "ouster", "hesai", "imu", "gps", "gnss", "ego", "vehicle", "chassis"}
+    {"imu", "gps", "gnss", "ego", "vehicle", "chassis"}
     | {"base", "world", "map", "robot", "rig", "platform", "odom", "gripper", "tool", "flange", "effector", "drone"}
 )
 _NAMED = 0.2
@@ -138,7 +138,8 @@ def hints_of(keys: Sequence[object], texts: Sequence[str] = ()) -> KeyHints:
     said = [word for one in (*keys, *texts) for word in words_of(one)]
     names_radar = any(map(looks_like_radar, said))
     names_both = names_radar and any(map(looks_like_camera, said))
-    other = "" if names_both else next((word for word in words if word in _OTHERS), "")
+    lidar = next((str(key) for key in keys if looks_like_lidar(str(key))), "")
+    other = "" if names_both else lidar or next((word for word in words if word in _OTHERS), "")
     return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit, names_radar, other)
 
 
@@ -204,11 +205,13 @@ class FoundPose:
         place: the path to it, such as "calibration.radar.T"; "the file" if it is all there is.
         readings: every way to read its numbers; at least one.
         hints: what the names around it suggest.
+        names: these names: the short texts beside it, then the keys from the outermost on.
     """
 
     place: str
     readings: tuple[PoseReading, ...]
     hints: KeyHints = field(default_factory=KeyHints)
+    names: tuple[str, ...] = ()
 
     def with_hints(self, hints: KeyHints) -> "FoundPose":
         """Return it with other hints."""

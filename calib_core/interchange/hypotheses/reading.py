@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.check.pair_residuals import CheckPairs
-from calib_core.interchange.format import ImportedCalibration, WrittenPose
+from calib_core.interchange.format import ImportedCalibration, WrittenPose, looks_like_lidar, of_lidar
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.opencv import OPENCV
@@ -83,9 +83,8 @@ class UnstatedFile:
         camera = next((pose.place for pose in self.poses if pose.place in self.beside), place)
         if place not in self.beside and camera != place:
             raise InputError(
-                f"{self.source}: {place} and {camera} are the poses of a radar and of a camera in a frame that both share, if "
-                "they carry points into it; camera_from_radar is then inverse(camera) @ radar: write that 4x4 matrix to a file "
-                "and import it, or take one as it is with --pose NAME"
+                f"{self.source}: {place} and {camera} are the poses of a radar and of a camera in a frame that both share: "
+                "cocalib import composes them; or take one as it is with --pose NAME"
             )
 
 
@@ -128,11 +127,13 @@ def _states_nothing(content: Content) -> bool:
 
 
 def _hinted_by_name(pose: FoundPose, stem: str) -> FoundPose:
-    """Let the file's name hint at the direction if no name inside does."""
-    named = hints_of([stem])
-    if pose.hints.carries_radar != hints_of([]).carries_radar:
-        return pose
-    return pose.with_hints(replace(pose.hints, carries_radar=named.carries_radar))
+    """Let the file's name hint at the sensors and the direction if no name inside does."""
+    named, hints = hints_of([stem]), pose.hints
+    if not hints.other and not hints.names_radar and looks_like_lidar(named.other):
+        hints = replace(hints, other=named.other)
+    if hints.carries_radar == hints_of([]).carries_radar:
+        hints = replace(hints, carries_radar=named.carries_radar)
+    return pose.with_hints(hints)
 
 
 def _object_around(place: str, values: object) -> object:
@@ -191,6 +192,7 @@ def as_imported(file: UnstatedFile, pose: FoundPose, chosen: Hypothesis, *, by_h
     how = "picked by hand" if by_hand else "the only plausible meaning of the numbers"
     where = "" if pose.place == "the file" else f" at {pose.place}"
     meaning = chosen.meanings[0]
+    lidar = (of_lidar(pose.hints.other),) if looks_like_lidar(pose.hints.other) else ()
     camera, matrix_px = _camera(file, pose)
     return ImportedCalibration(
         BARE_POSE,
@@ -200,7 +202,10 @@ def as_imported(file: UnstatedFile, pose: FoundPose, chosen: Hypothesis, *, by_h
         camera=camera,
         matrix_px=matrix_px,
         notes=_notes(file, pose),
-        assumptions=(f"the file does not state what its pose{where} means; {how}: {meaning.words} ({meaning.key})",),
+        assumptions=(
+            *lidar,
+            f"the file does not state what its pose{where} means; {how}: {meaning.words} ({meaning.key})",
+        ),
     )
 
 

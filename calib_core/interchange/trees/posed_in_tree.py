@@ -8,7 +8,15 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.format import Axes, ImportedCalibration, StatedCheckPoint, WrittenPose, posed_between
+from calib_core.interchange.format import (
+    Axes,
+    ImportedCalibration,
+    StatedCheckPoint,
+    WrittenPose,
+    looks_like_lidar,
+    of_lidar,
+    posed_between,
+)
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
@@ -85,7 +93,7 @@ def calibration_in_tree(
         pose if known.axes == "optical" else replace(pose, axes="link"),
         frames=frames,
         check_point=check_point,
-        assumptions=known.assumptions,
+        assumptions=(*((of_lidar(chosen.radar),) if looks_like_lidar(chosen.radar) else ()), *known.assumptions),
         notes=tuple(note for note in (*chosen.notes, way, *tree.notes) if note),
         matrix_px=sensor.matrix_px if sensor is not None else None,
     ).checked(source)

@@ -186,7 +186,7 @@ def _of_astyx(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
         return None
     content = json_value(file.read_text(encoding="utf-8"), source=str(file))
     sensors = {row["sensor_uid"]: row["calib_data"] for row in content["sensors"]}
-    pose = f"its pose: T_to_ref_COS of the radar and of {folder.name} in {file}: inverse(camera) @ radar"
+    pose = f"its pose: cocalib import {file} --camera {folder.name}"
     return FolderCamera(file, np.array(sensors[folder.name]["K"], dtype=np.float64), np.zeros(0), None, pose)
 
 
