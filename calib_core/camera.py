@@ -76,6 +76,7 @@ class Camera:
         matrix_px: (3, 3) K, with focal lengths and principal point [px].
         distortion: (k,) coefficients in the lens model's order.
         covariance: how well all this is known; None if nobody said.
+        is_part: whether the image is a part of the sensor's, whose middle then says nothing of the principal point.
     """
 
     model: CameraModel
@@ -84,6 +85,7 @@ class Camera:
     matrix_px: Matrix33
     distortion: Values = field(default_factory=lambda: np.zeros(0))
     covariance: CameraCovariance | None = None
+    is_part: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, matrix_px=(3, 3), distortion=(None,))
@@ -209,7 +211,12 @@ class Camera:
         matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
         size_px = round(self.width_px * factor), round(self.height_px * factor)
         return Camera(
-            self.model, *size_px, matrix, self.distortion, self._rescaled_covariance(np.array([factor, factor]))
+            self.model,
+            *size_px,
+            matrix,
+            self.distortion,
+            self._rescaled_covariance(np.array([factor, factor])),
+            self.is_part,
         )
 
     def windowed(self, offset_px: tuple[int, int], size_px: tuple[int, int], binning: tuple[int, int]) -> "Camera":
@@ -226,7 +233,9 @@ class Camera:
         matrix[:2, :2] /= by[:, None]
         matrix[:2, 2] = (self.matrix_px[:2, 2] - offset_px + 0.5) / by - 0.5
         width, height = int(size_px[0] // by[0]), int(size_px[1] // by[1])
-        return Camera(self.model, width, height, matrix, self.distortion, self._rescaled_covariance(1.0 / by))
+        covariance = self._rescaled_covariance(1.0 / by)
+        is_part = self.is_part or tuple(size_px) != (self.width_px, self.height_px)
+        return Camera(self.model, width, height, matrix, self.distortion, covariance, is_part)
 
     def _rescaled_covariance(self, factors: Values) -> CameraCovariance | None:
         """Return the covariance for an image whose columns and rows are so many times as many (2,)."""

@@ -337,6 +337,9 @@ class Pair:
 
     def __post_init__(self) -> None:
         freeze(self, pixel_px=(2,))
+        for name in ("image_time", "radar_time"):
+            if (time := getattr(self, name)) is not None:
+                object.__setattr__(self, name, TimeNs(time))
         if not self.candidates:
             raise ValueError(f"pair {self.id} has no radar position")
 

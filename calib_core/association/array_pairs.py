@@ -8,9 +8,11 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3
 from calib_core.errors import InputError
-from calib_core.measurements import Candidate, Pair
+from calib_core.measurements import NS_PER_S, Candidate, Pair
 from calib_core.options import NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, sigma_polar_of
+
+_LAST_S = 9.2e9  # nanoseconds of later times do not fit 64 bits
 
 
 def pairs_from_arrays(
@@ -21,6 +23,7 @@ def pairs_from_arrays(
     sigma_polar: np.ndarray | None = None,
     noise: NoiseOptions | None = None,
     ids: Sequence[str] | None = None,
+    times_s: Sequence[float] | np.ndarray | None = None,
 ) -> tuple[Pair, ...]:
     """Make pairs from matched radar positions and pixels.
 
@@ -31,6 +34,7 @@ def pairs_from_arrays(
         sigma_polar: (3,) or (n, 3) standard deviations of range [m], azimuth and elevation [rad]; None takes `noise`.
         noise: assumed noise of the radar; None takes the defaults.
         ids: (n,) unique names; None numbers the pairs from 1.
+        times_s: (n,) when each was seen [s], of any epoch: they tell whether a sensor turned on the way; None if unknown.
 
     Raises:
         InputError: the arrays differ in length, contain numbers that are not finite, or a position is at the radar.
@@ -49,11 +53,14 @@ def pairs_from_arrays(
             raise InputError(f"points_radar_m[{i}]: {near}")
     if sigma_px is not None and not (np.isfinite(sigma_px) and sigma_px > 0.0):
         raise InputError(f"sigma_px: is {sigma_px:g}; a standard deviation must be finite and above zero")
+    times = np.full(len(points), None) if times_s is None else _times_ns(times_s, len(points))
     sigmas = _sigma_polar_rows(sigma_polar, noise or NoiseOptions(), len(points))
     covariances = covariance_from_sigma_polar(points, sigmas)
     return tuple(
-        Pair(name, pixel, (Candidate(point, sigma, covariance),), sigma_px)
-        for name, pixel, point, sigma, covariance in zip(names, pixels, points, sigmas, covariances, strict=True)
+        Pair(name, pixel, (Candidate(point, sigma, covariance),), sigma_px, image_time=time)
+        for name, pixel, point, sigma, covariance, time in zip(
+            names, pixels, points, sigmas, covariances, times, strict=True
+        )
     )
 
 
@@ -71,6 +78,15 @@ def _numbers(values: Any, columns: int, name: str) -> np.ndarray:
     if len(wrong):
         raise InputError(f"{name}[{wrong[0]}]: {array[wrong[0]].tolist()} is not finite; remove the pair")
     return array
+
+
+def _times_ns(times_s: Any, count: int) -> np.ndarray:
+    seconds = _numbers(np.reshape(times_s, (-1, 1)), 1, "times_s")[:, 0]
+    if len(seconds) != count:
+        raise InputError(f"times_s: {len(seconds)} times of {count} pairs; give one per pair")
+    if np.abs(seconds).max(initial=0.0) >= _LAST_S:
+        raise InputError(f"times_s: {seconds[np.abs(seconds).argmax()]:g} s is beyond the year 2262; give seconds")
+    return np.round(seconds * NS_PER_S).astype(np.int64)
 
 
 def _kind(values: Any) -> str:

@@ -4,6 +4,7 @@ A check returns an empty list if all is well.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,6 +45,13 @@ _OF_LENGTHS = ("camera-far-away", "weak-geometry", "two-poses", "lens-or-radar-s
 _OF_RETURNS = ("no-consensus", "many-outliers", "agreeing-outliers", "clock-bias-suspected", "doubtful-pair")
 _FOLLOWS = {"pixels-suspected": _OF_PIXELS, "units-suspected": (*_OF_PIXELS, *_OF_LENGTHS), "clocks-apart": _OF_RETURNS}
 """What a named cause makes likely, and what is said of it would send the user elsewhere."""
+_OBJECTIONS_TO_INTRINSICS = (
+    "intrinsics-suspected",
+    "many-outliers",
+    "residuals-too-large",
+    "camera-position-contradicted",
+    "camera-position-doubtful",
+)
 
 
 def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
@@ -69,6 +77,11 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         decisive_pair,
     )
     warnings = [warning for check in checks for warning in check(fit)]
+    if any(warning.code in _OBJECTIONS_TO_INTRINSICS for warning in warnings):
+        suspected = tuple(
+            replace(warning, code="pixels-suspected") if warning.code == "intrinsics-suspected" else warning
+            for warning in suspected
+        )
     return (*suspected, *_counted_up(warnings, fit.inliers))
 
 

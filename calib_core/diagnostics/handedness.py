@@ -95,7 +95,7 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
     sides, heights_decide = _expected_sides(plane, fit), _heights_decide(plane)
     if sides is not None and sides.same and not heights_decide:
         return []
-    if not heights_decide and not fit.measurements.prior.measured and not _mirrored_on_rig(plane, fit):
+    if not heights_decide and not _is_measured(fit) and not _mirrored_on_rig(plane, fit):
         return []
     if sides is not None and sides.opposite and not heights_decide:
         return [_on_other_side(sides)]
@@ -105,9 +105,14 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
     if gain > NOT_MIRRORED_GAIN or (sides is not None and sides.opposite):
         return [DataWarning("handedness-open")]
     prior = fit.measurements.prior
-    if prior.measured or heights_decide or (sides is not None and sides.same):
+    if _is_measured(fit) or heights_decide or (sides is not None and sides.same):
         return []
     return [DataWarning("handedness-assumed", {"within_m": prior.sigma_m})]
+
+
+def _is_measured(fit: SolvedFit) -> bool:
+    """Return whether the camera position was measured, and is more probably right than not."""
+    return fit.best.position is not None and fit.best.position.probability > 0.5
 
 
 def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
@@ -123,7 +128,7 @@ def _on_other_side(sides: GroundSides) -> DataWarning:
 
 def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
     """Return the sides if they tell something: the sensors are above the placements, and the camera is not measured."""
-    if not fit.options.solving.sensors_above_placements or fit.measurements.prior.measured:
+    if not fit.options.solving.sensors_above_placements or _is_measured(fit):
         return None
     return _sides_of(plane, fit)
 

@@ -26,6 +26,7 @@ and s the scales,
 is the part of the focal length's variance that knowing the scales would remove.
 """
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +109,12 @@ def _by_range(azimuth: ScoreTest, elevation: ScoreTest) -> DataWarning:
 def _turned(fit: SolvedFit, turn: TurnTest) -> DataWarning:
     return DataWarning(
         "shared-error-suspected",
-        {"turned_deg": float(np.rad2deg(turn.angle_rad)), "before": fit.ids[turn.before], "after": fit.ids[turn.after]},
+        {
+            "turned_deg": float(np.rad2deg(turn.angle_rad)),
+            "before": fit.ids[turn.before],
+            "after": fit.ids[turn.after],
+            "by_number": not _is_timed(fit),
+        },
     )
 
 
@@ -215,6 +221,23 @@ def _chance(squared: float, degrees_of_freedom: float, count: float = 1.0) -> fl
     return float(fdtrc(count, nu - count, squared / count) if nu > count + 1.0 else chdtrc(count, squared))
 
 
+def _is_timed(fit: SolvedFit) -> bool:
+    return any(time is not None for time in fit.times)
+
+
+def _times(fit: SolvedFit) -> np.ndarray:
+    """Return the times (n,) of the pairs, 0 where unknown; of pairs without any the numbers at the end of their ids, unless these
+    follow a column: pairs sorted by range are in no order of time."""
+    if _is_timed(fit):
+        return np.array([time or 0 for time in fit.times], dtype=np.int64)
+    ends = [re.search(r"(\d{1,9})$", name) for name in fit.ids]
+    numbers = np.array([int(end[1]) if end else 0 for end in ends], dtype=np.int64)
+    columns = np.column_stack([fit.refined.polar.T, fit.measurements.pixels_px, fit.measurements.rays])
+    steps = np.diff(columns[np.argsort(numbers, kind="stable")], axis=0)
+    is_sorted = ((steps >= 0.0).all(axis=0) | (steps <= 0.0).all(axis=0)).any()
+    return np.zeros_like(numbers) if is_sorted else numbers
+
+
 def _turn_test(fit: SolvedFit) -> TurnTest:
     """Estimate a turn by equation (8) with three unknowns, after each of some placements in time, and return the likeliest.
 
@@ -222,7 +245,8 @@ def _turn_test(fit: SolvedFit) -> TurnTest:
     score's variance grows by what smooth errors (`covariance`), twice the noise, add to it over independent ones.
     """
     refined, inliers = fit.refined, np.flatnonzero(fit.inliers)
-    times = [fit.times[i] or 0 for i in inliers]
+    times = _times(fit)[inliers]
+    inliers, times = inliers[np.argsort(times, kind="stable")], np.sort(times)
     residual, jacobian = weighted_rows(refined, inliers)
     priors, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
     residual = np.concatenate([residual, priors])

@@ -160,22 +160,25 @@ def _away(error: Values) -> Facts:
     }
 
 
+_DOUBTFUL, _CONTRADICTED = 0.02, 0.001
+"""Shares of right positions that are as far from the camera of the pairs."""
+
+
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Say that the pairs contradict the measured camera position, and that the pose hardly uses it."""
+    """Say that the pairs doubt or contradict the measured camera position, and how much the pose still uses it."""
     position = fit.best.position
-    if position is None or not position.contradicted:
+    if position is None or position.chance >= _DOUBTFUL:
         return []
-    return [
-        DataWarning(
-            "camera-position-contradicted",
-            {
-                "away_cm": 100.0 * position.away_m,
-                "sigmas": position.sigmas,
-                "misread": position.misread,
-                "unit": position.unit,
-            },
-        )
-    ]
+    facts = {
+        "away_cm": 100.0 * position.away_m,
+        "sigmas": position.sigmas,
+        "misread": position.misread,
+        "unit": position.unit,
+        "weight": position.probability,
+    }
+    if position.chance < _CONTRADICTED:
+        return [DataWarning("camera-position-contradicted", facts)]
+    return [DataWarning("camera-position-doubtful", facts | {"one_in": round(1.0 / position.chance)})]
 
 
 def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:

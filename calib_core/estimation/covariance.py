@@ -335,9 +335,8 @@ _INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
 _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
-_INDEPENDENT_LOG_ODDS = (
-    4.5  # prior log-odds of purely independent errors against each single split: about even against all
-)
+_INDEPENDENT_LOG_ODDS = 3.0
+"""Prior log-odds of independent errors against each single split: sets with partly smooth errors are then covered too."""
 _SHOWN = 0.3  # probability of smooth errors from which residuals show them
 _NEGLIGIBLE = 1e-10
 

@@ -2,16 +2,17 @@
 
 The pairs are fitted without the position first. Its distance a from the camera of that fit, with covariance C, tells how far
 it may be off: with V0 the variance that it has where the pairs say nothing, its expected error is e = V0 (V0 + C)^-1 a, so
-that its variance is V1 = (nu sigma^2 + |e|^2) / (nu - 2). With x the distance over the one that a right position exceeds in
-one set of thirty-three, it is believed with the probability
+that its variance is V1 = (nu sigma^2 + |e|^2) / (nu - 2). A position that was measured to another point, with a wrong sign or
+in another unit is off by much more, with the variance W. So it is right with the probability
 
-    q = 1 / (1 + exp(_STEEPNESS (x^2 - _HALF_WEIGHT^2))).                                                (8)
+    q = (1 - p) t(a; C + V0) / ((1 - p) t(a; C + V0) + p t(a; C + W)),                                   (8)
+
+t being the density of a distance whose scale the pairs estimated, and p the share of such slips.
 
 The answer is the mean of the pose with it, with q, and the pose without it. That is the pose of a position with the variance
 V1 / q + C (1 - q) / q, and the covariance grows by q (1 - q) times the square of the difference of the two poses, which is
 C (C + V1)^-1 a. So a camera measured to the housing, or with a wrong sign, does not pull the pose along, and a click that is
-moved a little moves the pose a little. A weight that depended on the pose it shapes would have two answers. Beyond x = 1 the
-position is named.
+moved a little moves the pose a little. A weight that depended on the pose it shapes would have two answers.
 """
 
 from dataclasses import dataclass, replace
@@ -25,12 +26,12 @@ from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 
-_LEVEL = 0.03  # probability that a right position is farther from that of the pairs
-_HALF_WEIGHT, _STEEPNESS = 1.05, 6.0
-_CONSISTENT, _LEAST_WEIGHT = (
-    0.5,
-    0.01,
-)  # x below which smooth angle errors change nothing; q of a position without weight
+_SLIP_PROBABILITY = 0.02  # p: of positions measured to another point of the housing, with a wrong sign, in another unit
+_SLIP_SIGMA_M, _SLIP_SIGMAS = (
+    0.3,
+    3.0,
+)  # per axis: the size of housings and mounts; and more than the tape is off anyway
+_LEAST_PROBABILITY = 0.01  # q of a position without weight
 _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
@@ -50,7 +51,8 @@ class WeighedPosition:
     Attributes:
         prior: with the standard deviation that it has in the fit; not a measured one where it has no weight.
         doubt: (6,) of the pose, (dt, dtheta): its outer product is the covariance of not knowing whether the position is right.
-        contradicted: whether a right position would be as far away in less than one set of thirty-three.
+        probability: q that it is right; the share of it in the pose.
+        chance: the share of right positions that are as far away or farther.
         away_m: of the camera from the measured position, by the pairs alone.
         sigmas: the same in standard deviations.
         misread: what would not contradict it in another unit, "position" or "ranges"; empty if neither.
@@ -59,7 +61,8 @@ class WeighedPosition:
 
     prior: CameraPrior
     doubt: Values
-    contradicted: bool
+    probability: float
+    chance: float
     away_m: float
     sigmas: float
     misread: str
@@ -79,42 +82,35 @@ def weighed_position(
     prior = measurements.prior
     weakened = replace(measurements, prior=prior.weakened())
     alone = fit_errors_in_variables(weakened, start, estimate_scale=estimate_scale, coarse=True)
-    centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone, smooth=False).covariance)
-    limit = _contradiction_sigmas(alone.degrees_of_freedom)
-    sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
-    if sigmas > _CONSISTENT * limit:
-        centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone).covariance)
-        sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
-    weight = float(1.0 / (1.0 + np.exp(min(_STEEPNESS * ((sigmas / limit) ** 2 - _HALF_WEIGHT**2), 500.0))))
+    centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone).covariance)
+    freedom = alone.degrees_of_freedom or np.inf
     away_m = prior.position_m - centre.position_m
     variance_m2 = prior.expected_variance_m2(np.zeros(3))
+    slip_m2 = variance_m2 + max(_SLIP_SIGMA_M, _SLIP_SIGMAS * prior.sigma_m) ** 2
+    right, slip = (_log_density(centre, away_m, v, freedom) for v in (variance_m2, slip_m2))
+    odds = np.log(1.0 / _SLIP_PROBABILITY - 1.0) + right - slip
+    probability = float(1.0 / (1.0 + np.exp(min(-odds, 500.0))))
+    sigmas = centre.sigmas_from(prior.position_m, variance_m2**0.5)
+    chance = _chance(sigmas, freedom)
     variance_m2 = prior.expected_variance_m2(variance_m2 * centre.solved(away_m, variance_m2))
     difference = centre.mixed @ centre.solved(away_m, variance_m2)
     weighed = weakened.prior
-    if weight > _LEAST_WEIGHT:
-        unbelieved_m2 = (1.0 - weight) * float(np.trace(centre.covariance_m2)) / 3.0
-        weighed = prior.weighed_with(float(np.sqrt((variance_m2 + unbelieved_m2) / weight)))
+    if probability > _LEAST_PROBABILITY:
+        unbelieved_m2 = (1.0 - probability) * float(np.trace(centre.covariance_m2)) / 3.0
+        weighed = prior.weighed_with(float(np.sqrt((variance_m2 + unbelieved_m2) / probability)))
     position = WeighedPosition(
         weighed,
-        np.sqrt(weight * (1.0 - weight)) * difference,
-        sigmas > limit,
+        np.sqrt(probability * (1.0 - probability)) * difference,
+        probability,
+        chance,
         float(np.linalg.norm(away_m)),
         sigmas,
-        *(_other_unit(centre, prior) if sigmas > limit else _NO_UNIT),
+        *_other_unit(centre, prior),
     )
     near = GncSolution(alone.camera_from_radar, 0.0, 1.0)
     scale = alone.noise_scale.tolist()
     again = replace(measurements, prior=weighed, errors=alone.measurements.errors)
     return position, fit_errors_in_variables(again, near, estimate_scale=estimate_scale, noise_scale=scale)
-
-
-def _contradiction_sigmas(degrees_of_freedom: float) -> float:
-    """Return the distance in standard deviations that a right position exceeds in 3 % of the sets: 3 F(3, nu), or chi-square."""
-    from scipy.special import chdtri, fdtri
-
-    if degrees_of_freedom <= 0:
-        return float(np.sqrt(chdtri(3.0, _LEVEL)))
-    return float(np.sqrt(3.0 * fdtri(3.0, degrees_of_freedom, 1.0 - _LEVEL)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,6 +136,21 @@ class _Centre:
         """Return the distance from a position that was measured with a standard deviation, in standard deviations."""
         away_m = self.position_m - position_m
         return float(np.sqrt(away_m @ self.solved(away_m, sigma_m**2)))
+
+
+def _log_density(centre: _Centre, away_m: Vector3, variance_m2: float, freedom: float) -> float:
+    """Return the log-density of a distance (3,) with the variance C + V, up to a constant: Student's t, or normal."""
+    squared = float(away_m @ centre.solved(away_m, variance_m2))
+    spread = centre.covariance_m2 + variance_m2 * np.eye(3)
+    tail = squared if np.isinf(freedom) else (freedom + 3.0) * np.log1p(squared / freedom)
+    return -0.5 * (float(np.linalg.slogdet(spread)[1]) + float(tail))
+
+
+def _chance(sigmas: float, freedom: float) -> float:
+    """Return the probability that a right position is as far away, in standard deviations: chi-square, or F(3, nu)."""
+    from scipy.special import chdtrc, fdtrc
+
+    return float(chdtrc(3.0, sigmas**2) if np.isinf(freedom) else fdtrc(3.0, freedom, sigmas**2 / 3.0))
 
 
 _NO_UNIT = ("", "")

@@ -2,7 +2,7 @@
 
 A pose can be solved from ranges in millimetres, from columns and rows in the wrong order or from another frame's axes, and its
 residuals may look good. What gives them away is their size: a reflector is clicked between a metre and a hundred from the
-radar, inside the image, and in front of the radar.
+radar, inside the image, and in front of the radar; a principal point is near the middle of the image.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ from calib_core.arrays import Points2, Points3
 from calib_core.camera import Camera
 from calib_core.measurements import DataWarning, Facts
 from calib_core.options import CalibrationOptions
+from calib_core.results.systematic_errors import OFF_MIDDLE, off_middle_px
 
 _FARTHEST_M = 100.0  # a reflector of a few decimetres is then a pixel or two wide
 _FARTHEST_CAMERA_M = 15.0
@@ -22,6 +23,10 @@ _SIDEWAYS_RAD = np.deg2rad(60.0)
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
 _PART_OF_IMAGE = 0.5
+_FARTHEST_OFF_MIDDLE = 0.12  # of the width or height: cameras publish up to 8 %
+_ASPECT_RATIOS = {"4:3": 4.0 / 3.0, "16:9": 16.0 / 9.0, "3:2": 1.5, "16:10": 1.6, "5:4": 1.25, "1:1": 1.0}
+_BETTER, _NEAR_MIDDLE = 9.2, 4.0
+"""By how much another image fits the principal point better (a likelihood ratio of 100), and how well at least, both squared."""
 _LEAST_PAIRS = 8
 
 
@@ -41,6 +46,7 @@ def implausible_input(
         *_units(points_radar_m),
         *_camera_units(options),
         *_pixels(ids, pixels_px, camera),
+        *_another_image(camera),
         *_axes(points_radar_m),
     )
 
@@ -84,6 +90,34 @@ def _pixels(ids: Sequence[str], pixels_px: Points2, camera: Camera) -> list[Data
     if len(ids) < _LEAST_PAIRS or max(reach_u, reach_v) >= _PART_OF_IMAGE:
         return []
     return [DataWarning("pixels-suspected", {**image, "reach": (reach_u, reach_v)})]
+
+
+def _another_image(camera: Camera) -> list[DataWarning]:
+    """Warn if the principal point is outside the image, or far from its middle, and of what image it seems to be."""
+    off_px, size = off_middle_px(camera), np.array([camera.width_px, camera.height_px], dtype=np.float64)
+    share = np.abs(off_px) / size
+    modes = {name: _off_another(camera, ratio) for name, ratio in _ASPECT_RATIOS.items()}
+    mode = min(modes, key=modes.__getitem__)
+    better = float(share @ share) / OFF_MIDDLE**2 - modes[mode] > _BETTER
+    if not off_px.any() or not (better or share.max() > _FARTHEST_OFF_MIDDLE):
+        return []
+    facts = {
+        "principal_point_px": camera.matrix_px[:2, 2].tolist(),
+        "width_px": camera.width_px,
+        "height_px": camera.height_px,
+        "mode": mode if better and modes[mode] < _NEAR_MIDDLE else "",
+    }
+    outside = share.max() > _PART_OF_IMAGE
+    return [DataWarning("pixels-suspected" if outside else "intrinsics-suspected", facts)]
+
+
+def _off_another(camera: Camera, ratio: float) -> float:
+    """Return the squared distance of the principal point from the middle, in standard deviations, of the nearest image with
+    another aspect ratio: as wide, or as high."""
+    width, height = camera.width_px, camera.height_px
+    sizes = np.array([(width, width / ratio), (height * ratio, height)])
+    shares = (camera.matrix_px[:2, 2] - (sizes - 1.0) / 2.0) / sizes
+    return float((shares**2).sum(axis=1).min()) / OFF_MIDDLE**2
 
 
 def _outside(pixels_px: Points2, size: tuple[int, int]) -> np.ndarray:

@@ -15,11 +15,12 @@ from calib_core.input_files import is_known_binary, no_text
 from calib_core.interchange.hypotheses.plain_values import is_npy, plain_values
 from calib_core.interchange.own.pairs_files import PairsFile
 from calib_core.interchange.syntax.content import readings
+from calib_core.measurements import NS_PER_S
 from calib_core.options import NoiseOptions
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import pixel_axis
 from calib_core.recordings.plain_files.source import PlainOptions
-from calib_core.recordings.plain_files.tables.opening import radar_columns
+from calib_core.recordings.plain_files.tables.opening import radar_columns, times_of
 from calib_core.recordings.plain_files.tables.text_tables import TextTable, open_text_table, read_cells, read_rows
 from calib_core.recordings.radar.column_guess import split_unit
 
@@ -41,12 +42,14 @@ class PairTable:
         points_radar_m: (n, 3) positions; z is 0 where the table has none, as of a radar without elevation.
         pixels_px: (n, 2).
         ids: (n,).
+        times_s: (n,) of the images [s]; None if the table has none.
         assumptions: what the table does not state.
     """
 
     points_radar_m: Points3
     pixels_px: Points2
     ids: tuple[str, ...]
+    times_s: np.ndarray | None = None
     assumptions: tuple[Assumption, ...] = ()
 
     def pairs(self, camera: Camera, noise: NoiseOptions | None, *, source: str) -> PairsFile:
@@ -63,7 +66,9 @@ class PairTable:
                 f"{where}: is no position, or at the radar's origin, which cannot be a return; remove the pair"
             )
         try:
-            pairs = pairs_from_arrays(self.points_radar_m, self.pixels_px, noise=noise, ids=self.ids)
+            pairs = pairs_from_arrays(
+                self.points_radar_m, self.pixels_px, noise=noise, ids=self.ids, times_s=self.times_s
+            )
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
         return PairsFile(camera, pairs, assumed=assumed)
@@ -102,7 +107,8 @@ def _of_text(table: TextTable, options: PlainOptions) -> PairTable:
         )
     of_radar = tuple("" if place in (pixels["u"], pixels["v"]) else name for place, name in enumerate(table.names))
     columns = radar_columns(replace(table, names=of_radar), options)
-    rows = read_rows(table, (*columns.wanted, pixels["u"], pixels["v"]), None)
+    times = times_of(replace(table, names=of_radar), columns, "", options) if columns.times.time else None
+    rows = read_rows(table, (*columns.wanted, pixels["u"], pixels["v"]), times)
     if rows.is_cut_off or not len(rows.values):
         raise RecordingError(f"{table.path}: {'its last row is cut off' if rows.is_cut_off else 'has no rows'}")
     values, pixels_px = rows.values[:, :-2], rows.values[:, -2:]
@@ -114,6 +120,7 @@ def _of_text(table: TextTable, options: PlainOptions) -> PairTable:
         columns.returns(values).points_radar_m,
         pixels_px,
         tuple(name or f"pair-{number}" for number, name in enumerate(ids, start=1)),
+        None if times is None else rows.times_ns / NS_PER_S,
         tuple(one.assumption for one in columns.plan.assumptions if one.assumption.key not in _NOT_OF_POSITIONS),
     )
 

@@ -356,7 +356,7 @@ def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool
     reflector = [reflector_offset(axis, name, options.reflector.offset_sigma_m) for axis, name in enumerate(_AXES)]
     widening = [
         scale("range_scale", options.radar.range_scale_sigma, 0),
-        *(click_offset(row, name, _click_sigma_px(options, camera, lens)) for row, name in enumerate(_AXES[:2])),
+        *(click_offset(row, _AXES[row], sigma) for row, sigma in enumerate(_click_sigma_px(options, camera, lens))),
         *_default_lens(options, camera, lens),
     ]
     if not flat:
@@ -382,15 +382,42 @@ def _azimuth_scale_sigma(radar: RadarOptions, *, flat: bool) -> float:
 _AXES = ("right", "down", "forward")
 
 
-def _click_sigma_px(options: CalibrationOptions, camera: Camera, lens: LensPrior | None) -> float:
+def _click_sigma_px(options: CalibrationOptions, camera: Camera, lens: LensPrior | None) -> tuple[float, float]:
     """Return the standard deviation of what clicks and principal point together are off by; no pair tells them apart.
 
     A lens with a prior of its own brings its principal point along.
     """
+    clicks_px = options.reflector.click_offset_sigma_px
     if lens is not None:
-        return options.reflector.click_offset_sigma_px
+        return clicks_px, clicks_px
     principal_point_px = scaled_px(options.lens.principal_point_sigma_px, camera)
-    return float(np.hypot(options.reflector.click_offset_sigma_px, principal_point_px))
+    if not principal_point_px:
+        return clicks_px, clicks_px
+    off_px, doubt = off_middle_px(camera), doubt_of_image(camera) ** 0.5
+    right, down = np.hypot(np.hypot(clicks_px, principal_point_px), doubt * off_px).tolist()
+    return right, down
+
+
+OFF_MIDDLE, _OFF_MIDDLE_ELSEWHERE = 0.035, 0.15
+"""Standard deviation of a principal point from the image's middle per axis, over its width and height: of right intrinsics
+(KITTI, TUM RGB-D, EuRoC, nuScenes and Cityscapes publish 0.2 to 4.6 %, webcams up to 8 %), and of those of another image."""
+_ELSEWHERE = 0.002  # probability of intrinsics that belong to another image, before the principal point is looked at
+
+
+def off_middle_px(camera: Camera) -> Values:
+    """Return how far the principal point is from the image's middle, right and down: (2,); zeros for a part of an image, or if
+    the intrinsics say themselves how well it is known."""
+    if camera.covariance is not None or camera.is_part:
+        return np.zeros(2)
+    return np.asarray(camera.matrix_px[:2, 2] - (np.array([camera.width_px, camera.height_px]) - 1.0) / 2.0)
+
+
+def doubt_of_image(camera: Camera) -> float:
+    """Return the probability that the intrinsics belong to another image, by their principal point alone."""
+    share = off_middle_px(camera) / np.array([camera.width_px, camera.height_px])
+    spread = _OFF_MIDDLE_ELSEWHERE / OFF_MIDDLE
+    ratio = share @ share / OFF_MIDDLE**2 * (1.0 - spread**-2.0) / 2.0 - 2.0 * np.log(spread)
+    return float(1.0 / (1.0 + (1.0 / _ELSEWHERE - 1.0) * np.exp(-ratio)))
 
 
 def scaled_px(sigma_px: float, camera: Camera) -> float:

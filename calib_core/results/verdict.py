@@ -299,6 +299,8 @@ def _when_good(calibration: Calibration, left: int | None) -> Action:
 def _most_helpful(calibration: Calibration, left: int | None) -> Action:
     """Return what reduces the uncertainty most: a placement, or what is known of an error that all pairs share.
 
+    A calibration read from a file knows no placement: it says nothing of further ones.
+
     Knowing an error with a share s of a variance leaves 1 - s of it, so it gains 1 / sqrt(1 - s).
     """
     best, dominant = calibration.next_placement, calibration.dominant_errors()
@@ -310,7 +312,7 @@ def _most_helpful(calibration: Calibration, left: int | None) -> Action:
     if best is not None and not best.may_stop:
         forward_m, left_m, up_m = best.position_radar_m.tolist()
         return PlaceReflector((forward_m, left_m, up_m), best.gain)
-    return Stop()
+    return Stop() if best is not None else Export()
 
 
 Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]
@@ -334,6 +336,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
     ),
     "coarse": (
         "radar-missing",
+        "camera-position-doubtful",
         "damaged-recording",
         "lost-returns",
         "many-outliers",
@@ -355,7 +358,6 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "choices-unused",
         "uncertain-association",
         "smooth-angle-errors",
-        "angle-scale",
         "lens-or-radar-scale",
         _NOT_MIRRORED,
         "nobody-confirmed",

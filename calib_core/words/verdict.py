@@ -206,7 +206,7 @@ _FIXED: dict[type, str] = {
     CalibrateLens: "Calibrate the lens",
     ConfirmAssumptions: "Confirm what is assumed about the recording, or state what is right",
     Export: "Done: export the calibration",
-    Stop: "No further placement would help noticeably: the radar's noise allows no more",
+    Stop: "This is as good as this radar gets: no further placement would help noticeably",
 }
 
 

@@ -452,18 +452,40 @@ def agreeing_outliers(*, ids: Sequence[str], in_time: str) -> Remark:
     )
 
 
-def camera_position_contradicted(*, away_cm: float, sigmas: float, misread: str = "", unit: str = "") -> Remark:
-    """Given when the pairs alone put the camera farther from the measured position than 3 % of right sets do; the farther,
-    the less it counts in the pose.
+def camera_position_contradicted(
+    *, away_cm: float, sigmas: float, misread: str = "", unit: str = "", weight: float = 0.0
+) -> Remark:
+    """Given when the pairs alone put the camera farther from the measured position than one of 1,000 right sets does.
 
     Could also be: whether the measured position, the intrinsics or the radar is wrong, or all clicks lie beside the radar's
     phase centre.
     """
+    return _measured_position(_far_from_measured(away_cm, sigmas, misread, unit), weight)
+
+
+def camera_position_doubtful(
+    *, away_cm: float, sigmas: float, one_in: int, misread: str = "", unit: str = "", weight: float = 1.0
+) -> Remark:
+    """Given when one of 50 right sets, but not one of 1,000, puts the camera as far from the measured position.
+
+    Could also be: a position that is right, by chance.
+    """
+    far = _far_from_measured(away_cm, sigmas, misread, unit)
+    return _measured_position(f"{far}; one of {one_in:,} right positions looks like this", weight)
+
+
+def _far_from_measured(away_cm: float, sigmas: float, misread: str, unit: str) -> str:
     looks = {"position": "; the measured position looks like ", "ranges": "; the radar's ranges look like "}
-    other = looks.get(misread, "") + unit
+    return (
+        f"the pairs alone place the camera {away_cm:.0f} cm from the measured position, {sigmas:.1f} standard deviations"
+        f"{looks.get(misread, '')}{unit}"
+    )
+
+
+def _measured_position(message: str, weight: float) -> Remark:
+    use = "the pose follows the pairs" if weight < 0.5 else f"the pose still uses it, as {weight:.0%} sure"
     return remark(
-        f"the pairs alone place the camera {away_cm:.0f} cm from the measured position, {sigmas:.1f} standard deviations{other}; "
-        "clicks that all lie as far beside the radar's phase centre would look the same; the pose follows the pairs",
+        f"{message}; clicks that all lie as far beside the radar's phase centre would look the same; {use}",
         f"measure again from the radar's antennas to the lens: forward, left, up; click {_APEX}; and check that the intrinsics "
         "are of this lens, zoom and image size",
         MeasureCameraPosition(),
@@ -477,12 +499,19 @@ def intrinsics_suspected(
     sigma: float = 0.0,
     stated_sigma: float | None = None,
     refined_too_far: Sequence[SystematicErrorResult] = (),
+    principal_point_px: Sequence[float] = (),
+    width_px: int = 0,
+    height_px: int = 0,
+    mode: str = "",
 ) -> Remark:
     """Given when a different focal length or distortion explains the residuals; 0.25 % chance of a false alarm for each.
-    Refined intrinsics: one changed by more than three times its stated sigma.
+    Refined intrinsics: one changed by more than three times its stated sigma. Or when the principal point is farther from the
+    image's middle than 12 % of its width or height, or in the middle of an image with another aspect ratio.
 
     Could also be: see below.
     """
+    if principal_point_px:
+        return _off_middle(principal_point_px, width_px, height_px, mode)
     if refined_too_far:
         changed = "; ".join(f"{error_words(error.name).label} {knowledge(error)}" for error in refined_too_far)
         return remark(
@@ -524,6 +553,7 @@ def shared_error_suspected(
     turned_deg: float = 0.0,
     before: str = "",
     after: str = "",
+    by_number: bool = False,
 ) -> Remark:
     """Given when the pairs alone put an error that they share (a scale of the radar's, the bias of its range, all clicks)
     farther from 0 than three standard deviations of theirs and of its prior together; 0.3 % chance of a false alarm for
@@ -544,8 +574,9 @@ def shared_error_suspected(
         ends = {"before": named(before), "after": named(after)}
         return remark(
             say(
-                "the camera or the radar seems to have turned by about {turned_deg:.1f} deg near {before} and {after}: the "
-                "placements up to there agree on another pose than the later ones",
+                "{order}the camera or the radar seems to have turned by about {turned_deg:.1f} deg near {before} and {after}: "
+                "the placements up to there agree on another pose than the later ones",
+                order="if the pairs are numbered in order of time, " if by_number else "",
                 turned_deg=turned_deg,
                 **ends,
             ),
@@ -629,20 +660,24 @@ def units_suspected(
 
 def pixels_suspected(
     *,
-    clicks: int,
-    width_px: int,
-    height_px: int,
+    clicks: int = 0,
+    width_px: int = 0,
+    height_px: int = 0,
     outside: int = 0,
     exchanged: bool = False,
     pair: str = "",
     pixel_px: Sequence[float] = (),
     reach: Sequence[float] = (),
+    principal_point_px: Sequence[float] = (),
+    mode: str = "",
 ) -> Remark:
     """Given when clicks are outside the image, or would be inside with column and row exchanged, or all are in its upper
-    left part.
+    left part; or when the principal point is outside the image, or far from its middle where the pairs object too.
 
     Could also be: an image that was cropped.
     """
+    if principal_point_px:
+        return _off_middle(principal_point_px, width_px, height_px, mode)
     image = f"the {width_px} x {height_px} image"
     if exchanged:
         return remark(
@@ -669,6 +704,18 @@ def pixels_suspected(
         f"all clicks are in the upper left {100 * across:.0f} x {100 * down:.0f} % of {image}: the clicked image seems to be "
         "smaller",
         "scale the clicks, or the intrinsics, to the same size of the image",
+        CalibrateLens(),
+    )
+
+
+def _off_middle(principal_point_px: Sequence[float], width_px: int, height_px: int, mode: str) -> Remark:
+    u_px, v_px = principal_point_px
+    middle = f"; it is in the middle of a {mode} image of the same sensor" if mode else ""
+    return remark(
+        f"the principal point ({u_px:.0f}, {v_px:.0f}) is far from the middle of the {width_px} x {height_px} image{middle}: the "
+        "intrinsics seem to be of another image, and the pose turned accordingly",
+        "use the intrinsics of this image size and mode, or calibrate the lens with a board; those of a part of the sensor's "
+        "image state it as roi",
         CalibrateLens(),
     )
 
@@ -839,6 +886,7 @@ SOLVER = by_code(
     behind_camera,
     camera_far_away,
     camera_position_contradicted,
+    camera_position_doubtful,
     choices_unused,
     clock_bias_suspected,
     clocks_apart,

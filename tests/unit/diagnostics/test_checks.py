@@ -115,17 +115,18 @@ def test_a_wrong_tape_measure_is_contradicted():
     assert "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, measured(0.02, (0.0, 0.4, 0.0)))
 
 
-def test_a_tape_that_fits_the_residuals_is_contradicted_by_the_pairs_all_the_same():
+def test_a_tape_that_fits_the_residuals_is_doubted_by_the_pairs_all_the_same():
     """An azimuth scale that is uncertain by 2 % leaves the pairs alone uncertain by 10 cm: then only half of these are found."""
-    contradicted = 0
+    doubted = 0
     for seed in range(6):
         simulated = simulate_pairs(20, rng=np.random.default_rng([51, seed]))
         x_m, y_m, z_m = simulated.rig.camera_position_radar_m.tolist()
         off = {"forward": (x_m - 0.3, y_m, z_m), "left": (x_m, y_m + 0.3, z_m), "up": (x_m, y_m, z_m + 0.3)}
         wrong = without_systematic_errors(measured(0.01, off[("forward", "left", "up")[seed % 3]]))
-        contradicted += "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, wrong)
+        found = codes(simulated.pairs, simulated.camera, wrong)
+        doubted += bool(found & {"camera-position-contradicted", "camera-position-doubtful"})
         assert codes(simulated.pairs, simulated.camera, measured(0.01, (x_m + 0.02, y_m, z_m - 0.02))) == set()
-    assert contradicted >= 5
+    assert doubted >= 5
 
 
 def test_placements_in_one_corner_give_a_weak_geometry():

@@ -122,8 +122,31 @@ def test_a_turn_between_two_placements_is_reported_with_its_angle_and_its_place(
         assert abs(before - 14) <= 3
         assert after == before + 1
         assert turns(turned(simulated, first=15, turn_deg=0.0), simulated) == []
-        assert turns(turned(simulated, first=15, turn_deg=1.5, timed=False), simulated) == []
+        assert not facts["by_number"]
         assert turns(turned(simulated, first=28, turn_deg=1.5), simulated) == []
+
+
+def numbered(pairs: list[Pair]) -> list[Pair]:
+    return [replace(pair, id=f"pair-{number}", image_time=None) for number, pair in enumerate(pairs, start=1)]
+
+
+def test_pairs_without_times_may_be_numbered_in_order_of_time_but_sorted_ones_are_not():
+    for seed in range(3):
+        simulated = simulate_pairs(30, rng=np.random.default_rng([10, seed]), noise="imaging")
+        pairs = turned(simulated, first=15, turn_deg=1.5)
+        (facts,) = turns(numbered(pairs), simulated)
+        assert facts["by_number"]
+        assert (
+            turns([replace(pair, id=name) for pair, name in zip(numbered(pairs), names(30), strict=True)], simulated)
+            == []
+        )
+        by_range = sorted(pairs, key=lambda pair: float(np.linalg.norm(pair.candidates[0].position_radar_m)))
+        assert turns(numbered(by_range), simulated) == []
+
+
+def names(count: int) -> list[str]:
+    """Return ids without numbers."""
+    return [f"{chr(97 + k // 26)}{chr(97 + k % 26)}" for k in range(count)]
 
 
 def test_pairs_that_were_set_aside_after_a_turn_are_said_to_be_the_last():

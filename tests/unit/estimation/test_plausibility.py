@@ -8,9 +8,12 @@ import pytest
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.calibration import calibrate_pairs
+from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
 from calib_core.measurements import Candidate, Facts, Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, Method, SolvingOptions
+from calib_core.results import Calibration
+from calib_core.results.verdict import stated_error, verdict_on
 from calib_core.synthetic.rig import RigOptions
 
 SUSPECTED = {"units-suspected", "pixels-suspected", "radar-axes-suspected"}
@@ -154,3 +157,61 @@ def test_a_position_behind_the_radar_is_an_outlier_and_not_the_end(simulated):
     behind = changed(first, position_radar_m=first.candidates[0].position_radar_m * np.array([-1.0, -1.0, 1.0]))
     outcome = calibrate_pairs([behind, *others], simulated.camera).unwrap()
     assert [pair.id for pair in outcome.pairs if not pair.inlier] == ["p1"]
+
+
+def with_principal_point(camera: Camera, right: float, down: float) -> Camera:
+    """Return the camera with its principal point off the image's middle by shares of width and height."""
+    matrix_px = camera.matrix_px.copy()
+    size = np.array([camera.width_px, camera.height_px])
+    matrix_px[:2, 2] = (size - 1.0) / 2.0 + np.array([right, down]) * size
+    return replace(camera, matrix_px=matrix_px)
+
+
+def with_clicks_of(simulated: SimulatedPairs, camera: Camera) -> Calibration:
+    """Solve with the clicks that this camera, if its intrinsics are right, would see."""
+    rng = np.random.default_rng(5)
+    seen = camera.project(simulated.camera_from_radar @ simulated.points_radar_m)
+    pixels = seen + rng.normal(0.0, 2.0, seen.shape)
+    points, _ = arrays(simulated)
+    inside = ((pixels > 0.0) & (pixels < [camera.width_px, camera.height_px])).all(axis=1)
+    sigma_polar = simulated.pairs[0].candidates[0].sigma_polar
+    return calibrate_pairs(pairs_from_arrays(points[inside], pixels[inside], sigma_polar=sigma_polar), camera).unwrap()
+
+
+def of_image(calibration: Calibration) -> list[tuple[str, str]]:
+    return [(one.code, one.facts["mode"]) for one in calibration.warnings if "principal_point_px" in one.facts]
+
+
+def test_the_matrix_of_another_image_mode_is_named(simulated):
+    """A camera's 4:3 matrix with its 16:9 images: no residual shows it, and the pose turns by as much."""
+    points, pixels = arrays(simulated)
+    wrong = with_principal_point(simulated.camera, 0.0, 0.5 * (16.0 / 9.0 / (4.0 / 3.0) - 1.0))
+    calibration = calibrate_pairs(pairs_from_arrays(points, pixels), wrong).unwrap()
+    assert of_image(calibration) == [("intrinsics-suspected", "4:3")]
+    assert verdict_on(calibration).level == "coarse"
+
+
+def test_a_principal_point_outside_the_image_contradicts_it(simulated):
+    points, pixels = arrays(simulated)
+    wrong = with_principal_point(simulated.camera, 0.0, 0.6)
+    calibration = calibrate_pairs(pairs_from_arrays(points, pixels), wrong).unwrap()
+    assert of_image(calibration) == [("pixels-suspected", "")]
+    assert verdict_on(calibration).level == "contradictory"
+
+
+def test_a_webcam_that_is_off_its_middle_stays_usable():
+    simulated = simulate_pairs(20, rng=np.random.default_rng(92), noise="imaging", rig_options=RIG)
+    webcam = with_principal_point(simulated.camera, 0.068, -0.081)
+    calibration = with_clicks_of(simulated, webcam)
+    assert of_image(calibration) == []
+    assert verdict_on(calibration).level in ("usable", "good")
+    middle = with_clicks_of(simulated, with_principal_point(simulated.camera, 0.0, 0.0))
+    assert stated_error(calibration).rotation_deg > stated_error(middle).rotation_deg
+
+
+def test_a_part_of_an_image_and_a_board_calibration_are_asked_nothing(simulated):
+    part = simulated.camera.windowed((0, 0), (simulated.camera.width_px, 600), (1, 1))
+    assert of_image(with_clicks_of(simulated, part)) == []
+    camera = with_principal_point(simulated.camera, 0.0, 0.2)
+    known = replace(camera, covariance=CameraCovariance(("cx_px", "cy_px"), np.eye(2)))
+    assert of_image(with_clicks_of(simulated, known)) == []

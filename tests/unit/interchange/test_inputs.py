@@ -444,6 +444,13 @@ def test_the_columns_of_a_table_may_have_any_order_and_ids():
     assert (pair.id, *pair.candidates[0].position_radar_m, *pair.pixel_px) == ("p7", *TABLE[0])
 
 
+def test_a_table_of_pairs_may_have_times():
+    text = b"stamp_ms,x_m,y_m,z_m,u,v\n1500,5,1,-0.5,212.9,239.4\n4000,7.1,0.2,-0.4,340,251.5\n"
+    pairs = read_pair_table(text, source="p.csv").pairs(PINHOLE, None, source="p.csv").pairs
+    assert [pair.image_time for pair in pairs] == [1_500_000_000, 4_000_000_000]
+    assert np.array([pair.pixel_px for pair in pairs]).tolist() == [list(row[3:]) for row in TABLE]
+
+
 SPELLINGS = {
     "mm, commas": b"id;X [mm];Y [mm];Z [mm];u;v\np;5000,0;1000,0;-500,0;212,9;239,4\nq;7100;200;-400;340;251,5\n",
     "units below": b"x y z u v\n[m] [m] [m] [px] [px]\n5.0 1.0 -0.5 212.9 239.4\n7.1 0.2 -0.4 340.0 251.5\n",

@@ -104,6 +104,7 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated):
     assert outcome.camera_from_radar.as_matrix().tobytes() == solved(simulated).camera_from_radar.as_matrix().tobytes()
     assert [pair.id for pair in pairs_from_arrays(points[:2], pixels[:2])] == ["pair-1", "pair-2"]
     assert pairs_from_arrays(points[:1], pixels[:1], sigma_px=2.5)[0].sigma_px == 2.5
+    assert pairs_from_arrays(points[:1], pixels[:1], times_s=[1.5])[0].image_time == 1_500_000_000
 
 
 @pytest.mark.parametrize(
@@ -123,6 +124,8 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated):
         (np.ones((1, 3)), np.zeros((1, 2)), {"sigma_px": np.nan}, "sigma_px: is nan; .* above zero"),
         (np.ones((1, 3)), np.zeros((1, 2)), {"sigma_px": -2.0}, "sigma_px: is -2; .* above zero"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"ids": ["a", "a"]}, "ids: there are duplicates"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"times_s": [1.0]}, "times_s: 1 times of 2 pairs"),
+        (np.ones((1, 3)), np.zeros((1, 2)), {"times_s": [1.7e18]}, "times_s: 1.7e"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2]}, "sigma_polar: expected an array of 3"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),
     ],

@@ -99,7 +99,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
     """
     table, topic = _open(path, options), topic_of(path, "radar")
     columns = radar_columns(table, options)
-    times = _times(table, columns, topic, options)
+    times = times_of(table, columns, topic, options)
     if times is None:
         shown = ", ".join(name.strip() for name in table.names[:12])
         raise RecordingError(
@@ -165,7 +165,7 @@ def is_one_scan_each(files: Sequence[Path], options: PlainOptions) -> bool:
     try:
         table = _open(files[0], options)
         columns = radar_columns(table, options)
-        times = _times(table, columns, "", options)
+        times = times_of(table, columns, "", options)
         if times is None or times.counted:
             return True
         return len(set(map(times.key, _rows(table)))) <= 1
@@ -197,7 +197,7 @@ def open_table_folder(
     columns = radar_columns(tables[0], options)
     values = [_values(table, columns, options) for table in tables]
     columns = columns.with_values(folder, np.concatenate(values))
-    times = _times(tables[0], columns, topic, options)
+    times = times_of(tables[0], columns, topic, options)
     inside = times is not None and not times.counted
     stamped = _stamped_inside(files, times, options) if times and inside else stamp_files(folder, files, options, known)
 
@@ -352,7 +352,8 @@ def _rows(table: Table) -> Sequence[Sequence[str]]:
     return table.sample if isinstance(table, JsonTable) else first_rows(table)
 
 
-def _times(table: Table, columns: RadarColumns, topic: str, options: PlainOptions) -> TimeReader | None:
+def times_of(table: Table, columns: RadarColumns, topic: str, options: PlainOptions) -> TimeReader | None:
+    """Return how the times of a table are read; None if it has none."""
     comma = isinstance(table, TextTable) and table.decimal_comma
     return time_reader(columns.times, _rows(table), topic, zone_s=options.zone_s, decimal_comma=comma)
 

@@ -103,6 +103,7 @@ _AWAY = {"away_deg": 12.0, "away_cm": 84.0}
 _SCORES = {"score": 31.0, "by_chance": 25.0, "rival": 29.0}
 _BOARD = Board("checkerboard", 9, 6, 0.025)
 _IMAGE = {"clicks": 9, "width_px": 640, "height_px": 480}
+_OFF_MIDDLE = {"principal_point_px": (646.0, 471.0), "width_px": 1280, "height_px": 720}
 _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("agreeing-outliers", {"ids": ["c3", "c4"], "in_time": ""}),
     DataWarning("agreeing-outliers", {"ids": ["c3", "c4"], "in_time": "first"}),
@@ -118,6 +119,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("camera-far-away", {"expected_m": 1.0, "solved_m": 7.2}),
     DataWarning("camera-far-away", {**_AWAY, "expected_m": 1.0, "sigmas": 9.0, "here_m": 0.4, "there_m": 1.9}),
     DataWarning("camera-position-contradicted", {"away_cm": 31.0, "sigmas": 7.0}),
+    DataWarning("camera-position-doubtful", {"away_cm": 31.0, "sigmas": 3.7, "one_in": 250, "weight": 0.96}),
     DataWarning("choices-unused", {"clicks": 1}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": 0.4}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": -0.4}),
@@ -142,6 +144,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("intrinsics-suspected", {"focal_length": 0.02, "sigma": 0.004, "stated_sigma": None}),
     DataWarning("intrinsics-suspected", {"distortion_px": 9.0, "sigma": 2.0, "stated_sigma": 1.0}),
     DataWarning("intrinsics-suspected", {"refined_too_far": [replace(_SCALE, name="focal_length", value=0.2)]}),
+    DataWarning("intrinsics-suspected", {**_OFF_MIDDLE, "mode": "4:3"}),
     DataWarning("lens-or-radar-scale", {"change": 0.02, "sigma": 0.01, "scales": [_SCALE]}),
     DataWarning("lost-returns", {"lost": 3, "read": 60, "where": "the radar around the clicks"}),
     DataWarning("many-outliers", {"ids": [f"c{number}" for number in range(1, 9)], "pairs": 20}),
@@ -157,6 +160,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("pixels-suspected", {**_IMAGE, "outside": 4, "exchanged": True}),
     DataWarning("pixels-suspected", {**_IMAGE, "outside": 4, "pair": "c7", "pixel_px": [900.0, 20.0]}),
     DataWarning("pixels-suspected", {**_IMAGE, "reach": (0.48, 0.45)}),
+    DataWarning("pixels-suspected", {**_OFF_MIDDLE, "mode": ""}),
     DataWarning("radar-axes-suspected", {"side": "left", "behind": 3, "pairs": 9}),
     DataWarning("repeated-placements", {"pairs": 9, "places": 4}),
     DataWarning("residuals-too-large", {"chi2_per_degree": 9.0}),
@@ -175,6 +179,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),
     DataWarning("shared-error-suspected", {"angle": "azimuth", "slope_deg_per_m": 0.11, "slope_sigma_deg_per_m": 0.02}),
     DataWarning("shared-error-suspected", {"turned_deg": 1.2, "before": "c7", "after": "c8"}),
+    DataWarning("shared-error-suspected", {"turned_deg": 1.2, "before": "c7", "after": "c8", "by_number": True}),
     DataWarning("smooth-angle-errors", {"growth": 3.0, "uncertain_lens": False}),
     DataWarning("two-poses", {**_AWAY, "sigmas": 48.0}),
     DataWarning("two-poses", {**_AWAY, "sigmas": 48.0, "other_returns": ["c2", "c5"]}),
