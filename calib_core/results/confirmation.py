@@ -33,8 +33,9 @@ def lost_data(
         damage: the recording's own warning that it is damaged; None if it is whole.
     """
     if without > _MANY * clicks:
-        code = "radar-mostly-missing" if without > _MOST * clicks else "radar-missing"
-        return DataWarning(code, {"lost": without, "clicks": clicks, "damage": damage})
+        most = without > _MOST * clicks
+        facts = {"lost": without, "clicks": clicks, "damage": damage}
+        return DataWarning("radar-mostly-missing" if most else "radar-missing", facts)
     if damage is None or not (touched or share > _MOST_LOST):
         return None
     return DataWarning("damaged-recording", {"lost": touched, "share": share, "damage": damage})
