@@ -120,7 +120,7 @@ def test_a_folder_of_calibrations_beside_images_gives_their_intrinsics(cocalib, 
     assert summary["radar"]["scans"] == 40
 
 
-@pytest.mark.parametrize(("name", "words"), [("idl", "--map"), ("pb", "protobuf"), ("flat", "flatbuffer")])
+@pytest.mark.parametrize(("name", "words"), [("idl", "--map"), ("pb", "descriptor"), ("flat", "flatc")])
 def test_a_radar_topic_that_is_not_read_has_its_reason(cocalib, cases, name, words):
     (topic,) = json.loads(cocalib("info", "--json", cases / "34-foxglove-schemas" / f"{name}.mcap").out)["topics"]
     assert words in topic["problem"]
