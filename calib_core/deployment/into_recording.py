@@ -10,7 +10,7 @@ import numpy as np
 
 from calib_core.arrays import Points3
 from calib_core.deployment.camera_info import ChosenTopic, InfoTemplate, choose_topic
-from calib_core.deployment.placing import SensorFrames, is_transforms, place_transform, read_frames
+from calib_core.deployment.placing import SensorFrames, place_transform, read_frames
 from calib_core.errors import InputError, RecordingError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.formats.statement import statement
@@ -22,6 +22,7 @@ from calib_core.recordings.containers.copying import CopiedFile, Losses, StoredM
 from calib_core.recordings.containers.mcap.writing import ChunkCompression, McapWriter
 from calib_core.recordings.containers.sources import Channel, ChannelNotes, MessageIndex, StoredChannel
 from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, MessageBuilder, TransformMessage
+from calib_core.recordings.frame_transforms import is_transforms
 from calib_core.recordings.messages.definitions import with_definition
 from calib_core.recordings.messages.foxglove import ros_message
 from calib_core.recordings.topics import join_topics

@@ -7,13 +7,11 @@ from functools import reduce
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, rotation_angle_rad
+from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.recordings import Recording
-from calib_core.recordings.messages.decoding import Message
-from calib_core.recordings.messages.definitions import short_type
+from calib_core.recordings.frame_transforms import FrameTransform, is_transforms, transforms_in
 from calib_core.recordings.topics import Topic, join_topics
 
-_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 _SAME = 1e-9
 OWN_RADAR_FRAME = "cocalib_radar"
 """The radar's frame where its own cannot be used."""
@@ -101,11 +99,6 @@ def _pose_above(below: RigidTransform, step: RigidTransform) -> RigidTransform:
     return step @ below
 
 
-def is_transforms(kind: str) -> bool:
-    """Return whether messages of a type hold transforms."""
-    return short_type(kind) in _TYPES
-
-
 def read_frames(recording: Recording) -> RecordedFrames:
     """Read every transform of a recording; a transform that takes several values has none of its own."""
     names = [topic.name for topic in recording.topics if is_transforms(topic.type) and topic.count]
@@ -120,26 +113,21 @@ def _read(topic: Topic, joints: dict[str, dict[str, Joint]]) -> int:
     unreadable = 0
     for row in range(len(topic)):
         try:
-            for message in topic.message(row).messages("transforms"):
-                _note(message, joints)
+            for transform in transforms_in(topic.message(row), topic.name):
+                _note(transform, joints)
         except (RecordingError, ValueError):  # the latter for a quaternion that is none
             unreadable += 1
     return unreadable
 
 
-def _note(message: Message, joints: dict[str, dict[str, Joint]]) -> None:
-    parent = message.message("header").text("frame_id").lstrip("/")
-    child = message.text("child_frame_id").lstrip("/")
-    known = joints.setdefault(child, {}).get(parent)
-    if known is not None and known.parent_from_child is None:
-        return
-    translation_m = np.array([message.number(f"transform.translation.{axis}") for axis in "xyz"])
-    quaternion = np.array([message.number(f"transform.rotation.{axis}") for axis in "wxyz"])
-    pose = RigidTransform(matrix_from_quaternion_wxyz(quaternion), translation_m)
-    if known is None or known.parent_from_child is None:
-        joints[child][parent] = Joint(parent, child, pose)
-    elif not np.allclose(known.parent_from_child.as_matrix(), pose.as_matrix(), rtol=0, atol=_SAME):
-        joints[child][parent] = Joint(parent, child, None)
+def _note(transform: FrameTransform, joints: dict[str, dict[str, Joint]]) -> None:
+    known = joints.setdefault(transform.child, {}).get(transform.parent)
+    pose: RigidTransform | None = transform.pose
+    if known is not None:
+        before = known.parent_from_child
+        same = before is not None and np.allclose(before.as_matrix(), transform.pose.as_matrix(), rtol=0, atol=_SAME)
+        pose = before if same else None
+    joints[transform.child][transform.parent] = Joint(transform.parent, transform.child, pose)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

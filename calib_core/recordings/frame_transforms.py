@@ -65,7 +65,7 @@ def frame_transforms(paths: Sequence[Path]) -> tuple[FrameTransform, ...]:
     """
     sources = open_sources(paths)
     try:
-        names = {channel.topic for source in sources for channel in source.channels if channel.type.endswith(_TYPES)}
+        names = {channel.topic for source in sources for channel in source.channels if is_transforms(channel.type)}
         return _transforms_of(join_topics(sources, names)[0], _MOST_MESSAGES)
     except MessageError as error:
         raise RecordingError(f"{paths[0]}: {error}") from error
@@ -83,7 +83,7 @@ def recorded_mount(topics: Sequence[Topic], frame: str, *, radar: str, body: boo
         radar: the radar's topic, whose name tells which of several radars it is.
         body: whether the returns are said to be in the body frame; then what does not move in /tf counts too.
     """
-    published = [topic for topic in topics if topic.type.endswith(_TYPES) and len(topic)]
+    published = [topic for topic in topics if is_transforms(topic.type) and len(topic)]
     kinds = [[topic for topic in published if not _is_moving(topic)], published if body else []]
     for some, most in zip(kinds, (_MOST_STATIC, _MOST_MESSAGES), strict=True):
         with contextlib.suppress(RecordingError, ValueError):  # damaged, or a quaternion that is none
@@ -137,8 +137,21 @@ def _is_moving(topic: Topic) -> bool:
 def _transforms(topic: Topic, most: int) -> Iterator[FrameTransform]:
     rows = np.unique(np.linspace(0, len(topic) - 1, min(len(topic), most)).astype(np.int64))
     for row in rows.tolist():
-        for stamped in topic.message(row).messages("transforms"):
-            yield _transform(stamped, topic.name)
+        yield from transforms_in(topic.message(row), topic.name)
+
+
+def is_transforms(kind: str) -> bool:
+    """Return whether messages of a type hold transforms."""
+    return kind.endswith(_TYPES)
+
+
+def transforms_in(message: Message, topic: str) -> Iterator[FrameTransform]:
+    """Yield the transforms of a message.
+
+    Raises:
+        MessageError: it is damaged.
+    """
+    return (_transform(stamped, topic) for stamped in message.messages("transforms"))
 
 
 def _transform(stamped: Message, topic: str) -> FrameTransform:
