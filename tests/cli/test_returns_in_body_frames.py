@@ -111,3 +111,18 @@ def test_a_recording_file_states_the_frame_and_the_mount(cocalib, published):
     with open_recording(radar, RecordingOptions(no_recording_file=True), require=("radar",)) as recording:
         as_published = recording.radar_scans().points_radar_m
     np.testing.assert_allclose(mount_of(CORNER) @ moved, as_published, atol=1e-9)
+
+
+def test_an_export_into_the_recording_takes_the_returns_back_as_the_calibration_did(
+    cocalib, published, sample, tmp_path
+):
+    bags = (published("base_link", moved=True, transforms=False), sample / "camera.bag")
+    calibration, out = tmp_path / "c.json", tmp_path / "all.mcap"
+    assert cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", calibration, *FLAGS).code == 0
+    answer = cocalib("export", calibration, "--to", "mcap", "--recording", *bags, "--out", out)
+    assert answer.code == 0, answer.err
+    written = RecordingOptions(radar_topic="/cocalib/radar_points")
+    with open_recording(out, written) as recording, open_recording(sample / "radar.bag", require=("radar",)) as own:
+        assert recording.radar_frame == "cocalib_radar"
+        points = recording.radar_scans().points_radar_m[:50]
+        np.testing.assert_allclose(points, own.radar_scans().points_radar_m[:50], atol=1e-5)

@@ -21,7 +21,7 @@ from cocalib.platform.terminal import print_exactly
 if TYPE_CHECKING:
     from calib_core.deployment import RecordingWritten
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange.calibration_file import CalibrationFile, Provenance
+    from calib_core.interchange.calibration_file import CalibrationFile
     from calib_core.interchange.exporting import Export as Written
     from calib_core.recordings import Recording
 
@@ -225,7 +225,7 @@ def _into_recording(file: "CalibrationFile", paths: Sequence[Path], out: Path, *
     if out.suffix.lower() != ".mcap":
         raise InputError(f"{out}: the new recording is an MCAP file; name it NAME.mcap")
     layout = out.with_name(out.stem + _LAYOUT_ENDING)
-    with _open_recording(paths, topics, file.provenance) as recording:
+    with _open_recording(paths, topics, file) as recording:
         writable(layout)
         require_room(out, sum(source.size_bytes for source in recording.sources))
         with writing_whole(out) as stream, progress_bar("writing messages") as progress:
@@ -235,17 +235,20 @@ def _into_recording(file: "CalibrationFile", paths: Sequence[Path], out: Path, *
     return 0
 
 
-def _open_recording(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance") -> "Recording":
-    """Open the recording with the topics and columns of the calibration, unless the user names others."""
+def _open_recording(paths: Sequence[Path], topics: TopicFlags, file: "CalibrationFile") -> "Recording":
+    """Open the recording with the topics, columns and radar's mount of the calibration, unless the user names others."""
     from calib_core.recordings import open_recording
 
     if topics == TopicFlags():
+        provenance, mount = file.provenance, file.vehicle.radar_mount
         like_before = replace(
             topics,
             radar_topic=",".join(provenance.radar_topics) or provenance.radar_topic,
             image_topic=provenance.image_topic,
             radar_axes=provenance.radar_axes,
             map=provenance.column_map,
+            radar_frame=None if mount is None else "body",
+            radar_mount=mount,
         )
         try:
             recording = open_recording(tuple(paths), like_before, require=("image",))
