@@ -36,7 +36,7 @@ from calib_core.recordings.radar.column_plan import StatedReading, parse_radar_a
 from calib_core.recordings.radar.layouts import layouts_of_parts
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
-from calib_core.recordings.radar.returns_origin import SAMPLED_SCANS, ReturnsOrigin, mount_of, named_origin, origin_of
+from calib_core.recordings.radar.returns_origin import ReturnsOrigin, mount_of, named_origin, origin_of, sampled
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
 from calib_core.recordings.selection import (
@@ -356,8 +356,7 @@ def _returns_origin(
         (mount_of(stated), "") if stated is not None else recorded_mount(topics, frame, radar=topic.name, body=body)
     )
     mount, radar_frame = mounted or (None, "")
-    scans = parts[0].sample(SAMPLED_SCANS)
-    return origin_of(scans, frame, mount, radar_frame=radar_frame, stated=options.radar_frame)
+    return origin_of(sampled(parts[0]), frame, mount, radar_frame=radar_frame, stated=options.radar_frame)
 
 
 def _radar_stream(

@@ -23,11 +23,11 @@ from calib_core.arrays import Points3, Values, Vector3
 from calib_core.geometry import RigidTransform, rotation_from_euler
 from calib_core.measurements import DataWarning, RadarScans
 from calib_core.radar import direction_cosines, polar_from_cartesian
+from calib_core.recordings.radar.scan_stream import RadarStream
 
 Origin: TypeAlias = Literal["sensor", "body", "unknown"]
 """Whose frame returns are in."""
 
-SAMPLED_SCANS = 40
 _SURE = float(np.log(1000.0))
 """A reading that is 1000 times likelier is taken: one recording of a thousand may be judged wrongly."""
 _BODY_FRAMES = frozenset(
@@ -40,7 +40,10 @@ _PLACE_M = 0.5
 _FLOAT32 = 2.0**-22
 """Of a coordinate: rounding to 32 bits, and the sums of a transform."""
 _DECIMALS = range(1, 6)
-_MOST_RETURNS = 20_000
+_MOST_RETURNS = 4000
+"""Evenly spread over the sample."""
+_STRETCHES, _SCANS_OF_A_STRETCH, _MOST_READ = 4, 10, 20_000
+"""Of consecutive scans, which are read together; fewer of a radar with many returns."""
 _REPEATING = np.logspace(-9, 2, 12)
 """Parameters of the Dirichlet distribution to choose from: the smaller, the more often values repeat."""
 _STANDING_MPS = 0.1
@@ -170,6 +173,15 @@ def named_origin(frame: str) -> Origin:
     return "body" if frame.lower().rpartition("/")[2] in _BODY_FRAMES else "sensor"
 
 
+def sampled(stream: RadarStream) -> RadarScans:
+    """Decode some stretches of consecutive scans, spread over the recording."""
+    each = len(stream.sample(1).points_radar_m)
+    long = int(np.clip(_MOST_READ // (_STRETCHES * max(each, 1)), 1, _SCANS_OF_A_STRETCH))
+    first = np.linspace(0, max(len(stream.times_ns) - long, 0), _STRETCHES).astype(np.int64)
+    wanted = np.unique(first[:, None] + np.arange(long))
+    return stream.decoded(wanted[wanted < len(stream.times_ns)])
+
+
 def origin_of(
     scans: RadarScans,
     frame: str,
@@ -187,7 +199,8 @@ def origin_of(
         radar_frame: the name of the radar's own frame; "" if it is not known.
         stated: what the user says.
     """
-    seen = scans.take(np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1)))
+    there = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
+    seen = scans.take(there[:: -(-len(there) // _MOST_RETURNS) or 1])
     points = seen.points_radar_m
     if not len(points):
         return ReturnsOrigin(frame, "unknown", stated, mount, radar_frame)
@@ -242,7 +255,7 @@ def _bins(points: Points3, step_m: float) -> float:
     _, first = np.unique(
         np.round(points / step_m), axis=0, return_index=True
     )  # a repeated return repeats about any place
-    x, y, _ = points = points[first[:: max(1, len(first) // _MOST_RETURNS)]].T
+    x, y, _ = points = points[first].T
     range_m, u, _ = direction_cosines(points.T).T
     angles = np.median(range_m) * np.array([np.arctan2(y, x), u])
     polar = _repeats(range_m, step_m) + max(_repeats(values, step_m) for values in angles)
