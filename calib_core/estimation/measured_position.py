@@ -25,6 +25,7 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.geometry import RigidTransform, camera_position_jacobian
+from calib_core.radar import cartesian_from_polar
 
 _SLIP_PROBABILITY = 0.02  # p: of positions measured to another point of the housing, with a wrong sign, in another unit
 _SLIP_SIGMA_M, _SLIP_SIGMAS = (
@@ -55,8 +56,8 @@ class WeighedPosition:
         chance: the share of right positions that are as far away or farther.
         away_m: of the camera from the measured position, by the pairs alone.
         sigmas: the same in standard deviations.
-        misread: what would not contradict it in another unit, "position" or "ranges"; empty if neither.
-        unit: which one that is; empty if none.
+        misread: what would not contradict it if it were read in another way, "position" or "ranges"; empty if neither.
+        unit: which unit that is, or "level" for a position along the ground instead of the radar's axes; empty if none.
     """
 
     prior: CameraPrior
@@ -105,7 +106,7 @@ def weighed_position(
         chance,
         float(np.linalg.norm(away_m)),
         sigmas,
-        *_other_unit(centre, prior),
+        *_misreading(centre, prior, _level(alone)),
     )
     near = GncSolution(alone.camera_from_radar, 0.0, 1.0)
     scale = alone.noise_scale.tolist()
@@ -153,17 +154,24 @@ def _chance(sigmas: float, freedom: float) -> float:
     return float(chdtrc(3.0, sigmas**2) if np.isinf(freedom) else fdtrc(3.0, freedom, sigmas**2 / 3.0))
 
 
-_NO_UNIT = ("", "")
+def _misreading(centre: _Centre, prior: CameraPrior, radar_from_level: Matrix33) -> tuple[str, str]:
+    """Return what would not contradict the pairs if it were read in another way, and in which.
 
-
-def _other_unit(centre: _Centre, prior: CameraPrior) -> tuple[str, str]:
-    """Return what would not contradict the pairs in another unit, and in which.
-
-    Divided by a hundred, any position is at the radar: only a camera that the pairs place away from it tells a unit.
+    Divided by a hundred, any position is at the radar: only a camera that the pairs place away from it tells.
     """
     if centre.sigmas_from(np.zeros(3), prior.sigma_m) <= _OTHER_UNIT_SIGMAS:
-        return _NO_UNIT
-    for misread, unit, factor in _UNIT_SLIPS:
-        if centre.sigmas_from(factor * prior.position_m, prior.sigma_m) < _AGREEING_SIGMAS:
-            return misread, unit
-    return _NO_UNIT
+        return "", ""
+    slips = {(misread, unit): factor * prior.position_m for misread, unit, factor in _UNIT_SLIPS}
+    slips["position", "level"] = radar_from_level @ prior.position_m
+    nearest = min(slips, key=lambda slip: centre.sigmas_from(slips[slip], prior.sigma_m))
+    return nearest if centre.sigmas_from(slips[nearest], prior.sigma_m) < _AGREEING_SIGMAS else ("", "")
+
+
+def _level(fit: ErrorsInVariablesFit) -> Matrix33:
+    """Return the rotation from axes along the plane of the placements, forward as the radar looks, to the radar's."""
+    points = cartesian_from_polar(fit.polar[:, fit.inliers].T)
+    up = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
+    up = up * (1.0 if up[2] >= 0.0 else -1.0)
+    left = np.cross(up, (1.0, 0.0, 0.0))
+    left = left / max(float(np.linalg.norm(left)), 1e-9)
+    return np.column_stack([np.cross(left, up), left, up])

@@ -478,7 +478,7 @@ def _far_from_measured(away_cm: float, sigmas: float, misread: str, unit: str) -
     looks = {"position": "; the measured position looks like ", "ranges": "; the radar's ranges look like "}
     return (
         f"the pairs alone place the camera {away_cm:.0f} cm from the measured position, {sigmas:.1f} standard deviations"
-        f"{looks.get(misread, '')}{unit}"
+        f"{looks.get(misread, '')}{'one measured level, not along the tilted radar' if unit == 'level' else unit}"
     )
 
 

@@ -17,6 +17,7 @@ from calib_core.results.verdict import stated_error, verdict_on
 from calib_core.synthetic.rig import RigOptions
 
 SUSPECTED = {"units-suspected", "pixels-suspected", "radar-axes-suspected"}
+DOUBTED = {"camera-position-contradicted", "camera-position-doubtful"}
 RIG = RigOptions(camera_offset_m=(0.0, 0.5, 0.1))
 
 
@@ -98,6 +99,18 @@ def test_feet_are_told_by_a_measured_position(simulated, in_ranges, in_tape, mis
     position_m = in_tape * simulated.rig.camera_position_radar_m
     found = found_in(simulated, in_ranges * points, pixels, position_m=position_m)["camera-position-contradicted"]
     assert (found["misread"], found["unit"]) == (misread, "feet")
+
+
+def test_a_position_measured_along_the_ground_beside_a_tilted_radar_is_told():
+    tilted = RigOptions(radar_tilt_deg=20.0, camera_offset_m=(1.5, 0.2, 0.4))
+    misread = []
+    for seed in range(6):
+        simulated = simulate_pairs(40, rng=np.random.default_rng([94, seed]), noise="imaging", rig_options=tilted)
+        level_m = simulated.rig.radar_from_world.rotation.T @ simulated.rig.camera_position_radar_m
+        found = found_in(simulated, *arrays(simulated), position_m=level_m)
+        misread += [(facts["misread"], facts["unit"]) for code, facts in found.items() if code in DOUBTED]
+    assert len(misread) >= 4
+    assert misread.count(("position", "level")) >= len(misread) - 1
 
 
 def test_a_position_in_centimetres_is_blamed_rather_than_the_placements():

@@ -119,6 +119,9 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("camera-far-away", {"expected_m": 1.0, "solved_m": 7.2}),
     DataWarning("camera-far-away", {**_AWAY, "expected_m": 1.0, "sigmas": 9.0, "here_m": 0.4, "there_m": 1.9}),
     DataWarning("camera-position-contradicted", {"away_cm": 31.0, "sigmas": 7.0}),
+    DataWarning(
+        "camera-position-contradicted", {"away_cm": 31.0, "sigmas": 7.0, "misread": "position", "unit": "level"}
+    ),
     DataWarning("camera-position-doubtful", {"away_cm": 31.0, "sigmas": 3.7, "one_in": 250, "weight": 0.96}),
     DataWarning("choices-unused", {"clicks": 1}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": 0.4}),
