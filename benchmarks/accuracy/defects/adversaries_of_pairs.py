@@ -107,7 +107,8 @@ def _told(draw: Draw) -> str:
 _MODES = ("agreeing-outliers", "doubtful-pair", "one-pair-decides", "two-poses")
 _HAND = ("mirrored-axes", "handedness-open")
 _LENS = ("angle-scale", "intrinsics-suspected")
-_UNITS = ("units-suspected", "camera-position-contradicted")
+_TAPE = ("camera-position-contradicted", "camera-position-doubtful")
+_UNITS = ("units-suspected", *_TAPE)
 
 _SHARED = (
     *_rows(
@@ -259,13 +260,13 @@ _INPUT = (
     Adversary(
         "tape-off-ti",
         "camera position 0.3 m off, ti, 20, tape",
-        ("camera-position-contradicted",),
+        _TAPE,
         partial(_tape_off, "tape-off-ti", "ti", 0.3),
     ),
     Adversary(
         "tape-off-imaging",
         "camera position 0.3 m off, imaging, 20, tape",
-        ("camera-position-contradicted",),
+        _TAPE,
         partial(_tape_off, "tape-off-imaging", "imaging", 0.3),
     ),
     *_rows(
@@ -304,7 +305,7 @@ def _gauge(finding: str, key: str, errors: SystematicErrors, change: Change | No
         for noise in _RADARS
         for known, tape_m in (("free", None), ("tape", _RIGHT_M))
     )
-    return _rows(finding, ("camera-position-contradicted",), *draws, gauge=True)
+    return _rows(finding, _TAPE, *draws, gauge=True)
 
 
 _RADARS: tuple[NoiseName, ...] = ("ti", "imaging")

@@ -54,7 +54,7 @@ def measure_drag(noise: NoiseName, tape_m: float | None, trial: int) -> Figures:
 
 def _said(calibration: Calibration) -> set[str]:
     """Return which clicks agree, and whether the measured position does not."""
-    codes = {one.code for one in calibration.warnings} & {"camera-position-contradicted"}
+    codes = {one.code for one in calibration.warnings} & {"camera-position-contradicted", "camera-position-doubtful"}
     return {pair.id for pair in calibration.pairs if pair.inlier} | codes
 
 
