@@ -39,11 +39,11 @@ _PLACE_M = 0.5
 """Returns of one cell of this width are one place, seen again and again."""
 _FLOAT32 = 2.0**-22
 """Of a coordinate: rounding to 32 bits, and the sums of a transform."""
-_DECIMALS = range(1, 6)
+_DECIMALS = range(1, 5)
 _MOST_RETURNS = 4000
 """Evenly spread over the sample."""
-_STRETCHES, _SCANS_OF_A_STRETCH, _MOST_READ = 4, 10, 20_000
-"""Of consecutive scans, which are read together; fewer of a radar with many returns."""
+_STRETCHES, _SCANS_OF_A_STRETCH, _ENOUGH = 4, 100, 2000
+"""Of consecutive scans, which are read together, until there are enough returns."""
 _REPEATING = np.logspace(-9, 2, 12)
 """Parameters of the Dirichlet distribution to choose from: the smaller, the more often values repeat."""
 _STANDING_MPS = 0.1
@@ -59,7 +59,8 @@ _NEAR_M = 0.3
 _PLANE_M, _WIDE_M = 0.003, 0.3
 """How near the place a plane passes, of returns in one bin of range, and of those in others: bins are 3 cm or more wide."""
 _FARTHEST_MOUNT_M = 10.0
-_LEAST_DETERMINANT = 0.02
+_PARALLEL = 0.05
+"""Planes that are nearly parallel leave a direction open, as bins of angle do: the place nearest to the origin is taken."""
 _TRIES = 400
 _MOST_PAIRED, _MOST_PAIRS = 2000, 4000
 _ELSEWHERE = RigidTransform(np.eye(3), np.array([1.0, 1.0, 0.0]))
@@ -175,8 +176,8 @@ def named_origin(frame: str) -> Origin:
 
 def sampled(stream: RadarStream) -> RadarScans:
     """Decode some stretches of consecutive scans, spread over the recording."""
-    each = len(stream.sample(1).points_radar_m)
-    long = int(np.clip(_MOST_READ // (_STRETCHES * max(each, 1)), 1, _SCANS_OF_A_STRETCH))
+    each = len(stream.sample(2).points_radar_m) // 2
+    long = int(np.clip(_ENOUGH // (_STRETCHES * max(each, 1)), 1, _SCANS_OF_A_STRETCH))
     first = np.linspace(0, max(len(stream.times_ns) - long, 0), _STRETCHES).astype(np.int64)
     wanted = np.unique(first[:, None] + np.arange(long))
     return stream.decoded(wanted[wanted < len(stream.times_ns)])
@@ -212,7 +213,7 @@ def origin_of(
     else:
         log_ratio = min(_bins(_ELSEWHERE @ points, step_m) - figures[0].bins, 0.0)
     place_m = None
-    if log_ratio > -_SURE and (mount is None or log_ratio < _SURE):
+    if mount is None or abs(log_ratio) < _SURE:
         place_m, by_place = _measured_at(points, step_m)
         place_m, log_ratio = (place_m, by_place) if by_place > _SURE else (None, log_ratio)
     by_data: Origin = "unknown" if abs(log_ratio) < _SURE else "body" if log_ratio > 0.0 else "sensor"
@@ -278,14 +279,13 @@ def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
     apart = (points[pairs[:, 1]] - points[pairs[:, 0]])[:, axes]
     long_m = np.linalg.norm(apart, axis=1)
     pairs, normals = pairs[long_m > 10.0 * _PLANE_M], (apart / long_m[:, None])[long_m > 10.0 * _PLANE_M]
-    grid = min(_repeats(points[:, axis], step_m) for axis in (0, 1))
-    if len(pairs) < _FEWEST or len(axes) < 2 or grid > _SURE:
+    few, many = sorted(_repeats(points[:, axis], step_m) for axis in (0, 1))
+    if len(pairs) < _FEWEST or len(axes) < 2 or few > max(_SURE, 0.1 * many):  # bins of both x and y are a grid
         return np.zeros(3), 0.0
     middles = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])[:, axes]
     offsets = (normals * middles).sum(axis=1)
     some = np.random.default_rng(0).integers(len(pairs), size=(_TRIES, len(axes)))
-    some = some[np.abs(np.linalg.det(normals[some])) > _LEAST_DETERMINANT]
-    places = np.linalg.solve(normals[some], offsets[some][:, :, None])[:, :, 0]
+    places = (np.linalg.pinv(normals[some], _PARALLEL) @ offsets[some][:, :, None])[:, :, 0]
     places = np.concatenate([np.zeros((1, len(axes))), places[np.linalg.norm(places, axis=1) < _FARTHEST_MOUNT_M]])
     off_m = np.abs(places @ normals.T - offsets)
     off_m[np.linalg.norm(places[:, None] - middles, axis=2) < 5.0 * _NEAR_M] = np.inf  # near it all pairs are alike
