@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from calib_core.arrays import Flags, Indices, Values, freeze
 from calib_core.camera import Camera
@@ -146,6 +145,8 @@ def _best(rays: Sequence[CandidateRays], prior: MountingPrior, rows: Indices) ->
 
 def _deals(views: Sequence[DwellView], stays: Flags) -> list[Indices]:
     """Return different deals of the radar's positions (n,), each to dwells of other times as far as there are any."""
+    from scipy.optimize import linear_sum_assignment
+
     moved = np.flatnonzero(~stays)
     n = len(moved)
     together = ~apart_in_time(views)[np.ix_(moved, moved)]
