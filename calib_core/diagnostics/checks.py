@@ -10,21 +10,22 @@ import numpy as np
 
 from calib_core.arrays import Flags
 from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.diagnostics.causes import causes
 from calib_core.diagnostics.handedness import handedness
-from calib_core.diagnostics.intrinsics import intrinsics, lens_or_scale, refined_too_far
+from calib_core.diagnostics.intrinsics import lens_or_scale, refined_too_far
 from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, pivotal_pair
 from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.estimation.alternative_poses import NARROW_CONDITION
-from calib_core.estimation.covariance import PoseCovariance, symmetric_inverse
+from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
-from calib_core.results.systematic_errors import systematic_error_warnings
+from calib_core.results.systematic_errors import scaled_angles
 
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3
@@ -64,7 +65,7 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         camera_position,
         _flat_radar,
         _many_outliers,
-        _wrong_lens,
+        _causes,
         lens_or_scale,
         _systematic_errors,
         _noise_excess,
@@ -111,22 +112,14 @@ def _other_poses(fit: SolvedFit) -> list[DataWarning]:
     return two_poses(fit) or possible_poses(fit)
 
 
-def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of given intrinsics that the residuals contradict, or that refining had to change beyond belief."""
-    return intrinsics(fit) or refined_too_far(fit)
+def _causes(fit: SolvedFit) -> list[DataWarning]:
+    """Name refined intrinsics that had to change beyond belief, or what else would explain the residuals."""
+    return refined_too_far(fit) or causes(fit)
 
 
 def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
-    errors, shared = fit.uncertainty.systematic_errors, fit.refined.measurements.errors
-    variances = np.diag(symmetric_inverse(fit.uncertainty.information))[6:].tolist()
-    by_fit = {
-        error.name: variance**0.5 for error, variance in zip(shared.estimated, variances, strict=True) if error.of_radar
-    }
-    if not fit.uncertainty.shows_smooth:  # smooth errors of the radar would pass for these
-        by_fit |= {error.name: error.sigma for error in errors if error.name.startswith(("click_", "range_scale"))}
-    return systematic_error_warnings(
-        errors, by_fit, flat=fit.measurements.flat, measured=fit.measurements.prior.measured
-    )
+    errors, flat = fit.uncertainty.systematic_errors, fit.measurements.flat
+    return scaled_angles(errors, flat=flat, measured=fit.measurements.prior.measured)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

@@ -18,10 +18,10 @@ errors of the lens are estimated, and the model is linearized through the camera
 The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
 comes out too large. A new error is one more entry of `systematic_errors`, and of
 `calib_core.words.systematic_errors` with what it is called. Files keep what is known of it (`SystematicErrorResult`);
-`dominant_errors` and `systematic_error_warnings` find those that matter.
+`dominant_errors` and `scaled_angles` find those that matter.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -631,38 +631,19 @@ _LEAST_TOLD = 0.005  # share of the prior variance that the pairs must take away
 _SCALES = ("azimuth_scale", "elevation_scale")
 
 
-def systematic_error_warnings(
-    errors: Sequence[SystematicErrorResult], by_fit: Mapping[str, float], *, flat: bool, measured: bool
-) -> list[DataWarning]:
-    """Warn of errors that the pairs put where their priors do not allow them, and of scaled angles that they clearly show.
+def scaled_angles(errors: Sequence[SystematicErrorResult], *, flat: bool, measured: bool) -> list[DataWarning]:
+    """Tell of scaled angles that the pairs clearly show, within what is assumed of them.
 
     Args:
         errors: all that the pairs share, with what is known of them.
-        by_fit: of those that are compared with their priors, the standard deviations that independent noise leaves them.
         flat: whether the radar does not measure elevation.
         measured: whether the camera position was measured, so that its error is one of the causes.
     """
-    alone = {
-        error.name: (error, *_by_pairs_alone(error, by_fit[error.name])) for error in errors if error.name in by_fit
-    }
-    beyond = {
-        name: _beyond_prior_warning(error, size, sigma)
-        for name, (error, size, sigma) in alone.items()
-        if by_fit[name] ** 2 < (1.0 - _LEAST_TOLD) * error.prior_sigma**2
-        and size > _BEYOND * np.hypot(sigma, error.prior_sigma)
-    }
-    scales = [
+    return [
         _angle_scale(error, flat=flat, measured=measured)
         for error in errors
-        if error.name in _SCALES and error.name not in beyond and _is_clear(error) and abs(error.value) > _NOTABLE_SCALE
+        if error.name in _SCALES and _is_clear(error) and abs(error.value) > _NOTABLE_SCALE
     ]
-    return [*beyond.values(), *scales]
-
-
-def _beyond_prior_warning(error: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
-    value = float(np.copysign(size, error.value))
-    facts = {"error": error.name, "value": value, "sigma": sigma, "prior_sigma": error.prior_sigma}
-    return DataWarning("shared-error-suspected", facts)
 
 
 def _is_clear(error: SystematicErrorResult) -> bool:
@@ -670,7 +651,7 @@ def _is_clear(error: SystematicErrorResult) -> bool:
 
 
 def _angle_scale(error: SystematicErrorResult, *, flat: bool, measured: bool) -> DataWarning:
-    size, sigma = _by_pairs_alone(error, error.sigma)
+    size, sigma = _by_pairs_alone(error)
     facts = {
         "error": error.name,
         "value": float(np.copysign(size, error.value)),
@@ -681,12 +662,11 @@ def _angle_scale(error: SystematicErrorResult, *, flat: bool, measured: bool) ->
     return DataWarning("angle-scale", facts)
 
 
-def _by_pairs_alone(result: SystematicErrorResult, by_fit: float) -> tuple[float, float]:
+def _by_pairs_alone(result: SystematicErrorResult) -> tuple[float, float]:
     """Return size and standard deviation of an error without its prior, which draws the estimate to 0.
 
-    With p the prior and s what independent noise leaves of it, the estimate is k = 1 - s^2 / p^2 times that of the pairs alone,
-    so that with their variance v, smooth errors included, its own is v k^2 + (1 - k)^2 p^2.
+    With p the prior and s what is left of it, the estimate is k = 1 - s^2 / p^2 times that of the pairs alone.
     """
-    prior, share = result.prior_sigma, max(1.0 - (by_fit / result.prior_sigma) ** 2, _LEAST_TOLD)
+    prior, share = result.prior_sigma, max(1.0 - (result.sigma / result.prior_sigma) ** 2, _LEAST_TOLD)
     variance = result.sigma**2 - ((1.0 - share) * prior) ** 2
     return abs(result.value) / share, float(np.sqrt(max(variance, 0.0))) / share

@@ -497,16 +497,16 @@ def intrinsics_suspected(
     focal_length: float | None = None,
     distortion_px: float = 0.0,
     sigma: float = 0.0,
-    stated_sigma: float | None = None,
+    beside: Sequence[tuple[str, str]] = (),
     refined_too_far: Sequence[SystematicErrorResult] = (),
     principal_point_px: Sequence[float] = (),
     width_px: int = 0,
     height_px: int = 0,
     mode: str = "",
 ) -> Remark:
-    """Given when a different focal length or distortion explains the residuals; 0.25 % chance of a false alarm for each.
-    Refined intrinsics: one changed by more than three times its stated sigma. Or when the principal point is farther from the
-    image's middle than 12 % of its width or height, or in the middle of an image with another aspect ratio.
+    """Given when a different focal length or distortion explains the residuals best, beyond what is assumed of it. Refined
+    intrinsics: one changed by more than three times its stated sigma. Or when the principal point is farther from the image's
+    middle than 12 % of its width or height, or in the middle of an image with another aspect ratio.
 
     Could also be: see below.
     """
@@ -522,16 +522,14 @@ def intrinsics_suspected(
             CalibrateLens(),
         )
     if focal_length is not None:
-        stated = "" if stated_sigma is None else f"; its calibration said ± {100 * stated_sigma:.2g} %"
         message = (
             "residuals grow with the distance from the image's centre: the given focal length seems "
-            f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}{stated}"
+            f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}{_or_else(beside)}"
         )
     else:
-        stated = "" if stated_sigma is None else f"; its calibration said ± {stated_sigma:.2g} px"
         message = (
             "residuals grow with the cube of the distance from the image's centre: the given lens distortion seems off by "
-            f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click{stated}"
+            f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click{_or_else(beside)}"
         )
     return remark(
         message,
@@ -541,56 +539,103 @@ def intrinsics_suspected(
     )
 
 
+_OF_CAUSES = {
+    "range": ("ranges", 100.0, "cm"),
+    "azimuth": ("azimuths", 180.0 / np.pi, "deg"),
+    "elevation": ("elevations", 180.0 / np.pi, "deg"),
+    "column": ("clicks along the columns", 1.0, "px"),
+    "row": ("clicks along the rows", 1.0, "px"),
+}
+"""What a quantity is called, and its unit with the factor from SI."""
+_OF_SHAPES = {
+    "": "by a constant",
+    "range": "more and more with the range",
+    "nearness": "more at near placements",
+    "azimuth": "more and more with the azimuth",
+    "elevation": "more and more with the elevation",
+    "azimuth^2": "at both edges",
+    "azimuth elevation": "more and more towards opposite corners",
+    "elevation^2": "at high and low placements",
+    "azimuth^3": "more and more towards the edges",
+    "time": "more and more in the course of the recording",
+}
+_OF_STEPS = {
+    "turn": ("the camera or the radar seems to have turned by about", 180.0 / np.pi, "deg"),
+    "move": ("the camera or the radar seems to have moved by about", 100.0, "cm"),
+    "range step": ("the radar's ranges seem to have jumped by about", 100.0, "cm"),
+}
+
+
 def shared_error_suspected(
     *,
     error: str = "",
     value: float = 0.0,
     sigma: float = 0.0,
     prior_sigma: float = 0.0,
-    angle: str = "",
-    slope_deg_per_m: float = 0.0,
-    slope_sigma_deg_per_m: float = 0.0,
-    turned_deg: float = 0.0,
+    quantity: str = "",
+    shape: str = "",
+    largest: float = 0.0,
+    largest_sigma: float = 0.0,
+    beside: Sequence[tuple[str, str]] = (),
+    step: str = "",
+    size: float = 0.0,
     before: str = "",
     after: str = "",
     by_number: bool = False,
 ) -> Remark:
-    """Given when the pairs alone put an error that they share (a scale of the radar's, the bias of its range, all clicks)
-    farther from 0 than three standard deviations of theirs and of its prior together; 0.3 % chance of a false alarm for
-    each. Or the radar's azimuths or elevations change with the range: 0.25 % for each. Or camera or radar turned between
-    two placements: fewer than 1 %.
+    """Given when an error that all pairs share would explain the residuals, and is beyond what is assumed of it: of the radar's
+    ranges, azimuths or elevations, or of all clicks, constant or changing with range, angle or time; or a turn, a move or a
+    jump of the ranges between two placements. In fewer than 1 % of sound sets, `intrinsics-suspected` included.
 
     Could also be: returns of something behind the reflector at every placement, a wrong zoom, a cropped image,
     reflections from floor or walls, other points clicked at near placements, or a radar that is worse than its prior says.
     A turn: smooth angle errors, where the placements walked across the view.
     """
-    if angle:
-        return remark(
-            f"the radar's {angle}s are off by an amount that changes with the range: {slope_deg_per_m:+.2f} ± "
-            f"{slope_sigma_deg_per_m:.2f} deg per metre",
-            "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
-        )
-    if before:
+    if step:
+        what, factor, unit = _OF_STEPS[step]
         ends = {"before": named(before), "after": named(after)}
         return remark(
             say(
-                "{order}the camera or the radar seems to have turned by about {turned_deg:.1f} deg near {before} and {after}: "
-                "the placements up to there agree on another pose than the later ones",
+                "{order}{what} {size:.1f} {unit} near {before} and {after}: the placements up to there agree on another pose "
+                "than the later ones",
                 order="if the pairs are numbered in order of time, " if by_number else "",
-                turned_deg=turned_deg,
+                what=what,
+                size=factor * size,
+                unit=unit,
                 **ends,
             ),
             say("solve the placements up to {before} and from {after} on apart, and check both mounts", **ends),
             ReviewPairs((before, after)),
         )
+    others = _or_else(beside)
+    if quantity:
+        what, factor, unit = _OF_CAUSES[quantity]
+        owner = "the radar's " if quantity in ("range", "azimuth", "elevation") else "all "
+        return remark(
+            f"{owner}{what} seem off {_OF_SHAPES[shape]}, by up to {factor * largest:+.1f} ± {factor * largest_sigma:.1f} {unit}"
+            f"{others}",
+            "check how the radar's driver computes its angles and ranges, whether the floor or a wall reflects the radar there, "
+            "and what was clicked at near and at far placements",
+        )
     known = error_words(error)
     family = FAMILIES.get(family_of(error))
     name = known.text if family is None else f"{family.text} ({known.label})"
     return remark(
-        f"{name}: {value_text(error, value, sigma)} by the pairs, where {prior_text(error, prior_sigma)} is assumed",
+        f"{name}: {value_text(error, value, sigma)} by the pairs, where {prior_text(error, prior_sigma)} is assumed{others}",
         "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics are of this "
         "very image, uncropped; if the error is really so large, give it a larger sigma among the options",
     )
+
+
+def _or_else(beside: Sequence[tuple[str, str]]) -> str:
+    """Name the causes that would look nearly the same."""
+    if not beside:
+        return ""
+    names = [
+        f"{_OF_CAUSES[quantity][0]} off {_OF_SHAPES[shape]}" if quantity in _OF_CAUSES else f"a wrong {quantity}"
+        for quantity, shape in beside
+    ]
+    return f"; {' or '.join(names)} would look nearly the same"
 
 
 def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured: bool) -> Remark:

@@ -1,0 +1,338 @@
+"""Causes: what that all pairs share, and that is no unknown of the fit, would explain the residuals?
+
+A cause is a column g of the design: a quantity (range, azimuth, elevation, column or row of the click) times a shape over the
+placements (constant, the range, the azimuth, its square, ...), an error of the lens, or a step between two placements in time.
+With whitened residuals e, whitened Jacobians J of the pose and of the estimated errors, priors included, and
+M = I - J (J^T J)^-1 J^T, which removes what these can explain,
+
+    a = g^T M e / g^T M g,    var a = (s + sum_w (g^T M B_w)^2 / g^T M g) / g^T M g,                  (8)
+
+with s the noise that is left, because it was estimated from residuals that the cause had made larger, and B_w what else is
+uncertain: the errors that only widen the covariance, with their priors, and smooth angle errors (`covariance`). So what is within
+a prior is no cause. A test takes one step from the optimum and needs no second fit. The level is that of all causes together; a
+new cause is one shape or one quantity more.
+
+A wrong principal point cannot be detected: the rotation absorbs it. A radar without elevation is not tested: its own residuals
+grow towards the near placements.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Indices, Values
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.covariance import smooth_rows, weighted_rows, widening_rows
+from calib_core.estimation.measurement_model import prior_rows
+from calib_core.measurements import Facts
+from calib_core.results import DataWarning
+
+LEVEL = 0.01  # probability that any cause is named in a sound set
+_LEAST_PAIRS = 10
+_LEAST_LEFT = 0.05  # share of the residual's degrees of freedom that must stay unexplained
+_SMOOTH_RAD = np.deg2rad(14.0)
+_SMOOTH_VARIANCE, _SMOOTH_VARIANCE_OF_STEPS = 0.25, 4.0
+"""Of angle errors that neighbouring placements share, over the noise's. Steps are tested against twice the noise: placements that
+walk across the view turn one into the other."""
+_SHARES = {"turn": 0.3, "move": 0.05, "range step": 0.05, "stated": 0.3, "other": 0.3}
+"""Of the level: of steps by their kind, of what has a prior, and of everything else."""
+_MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # tried; on each side
+_DIFFERENT = 0.25  # of the tests of a kind count: neighbouring shapes and splits are nearly the same
+_COST = 2.0  # of the statistic, for each unknown of a cause (Akaike)
+_BESIDE = 6.0  # fall of the statistic up to which another cause is not told apart: a likelihood ratio of 20
+
+Shape = Callable[[np.ndarray], Values]
+"""Turns true positions (3, n), range [m], azimuth and elevation [rad], into a factor (n,)."""
+_SHAPES: Mapping[str, Shape] = {
+    "": lambda polar: np.ones(polar.shape[1]),
+    "range": lambda polar: polar[0] - polar[0].mean(),
+    "nearness": lambda polar: 1.0 / polar[0],
+    "azimuth": lambda polar: polar[1],
+    "elevation": lambda polar: polar[2],
+    "azimuth^2": lambda polar: polar[1] ** 2,
+    "azimuth elevation": lambda polar: polar[1] * polar[2],
+    "elevation^2": lambda polar: polar[2] ** 2,
+    "azimuth^3": lambda polar: polar[1] ** 3,
+}
+_OF_RADAR, _OF_CLICKS, _OF_LENS = ("range", "azimuth", "elevation"), ("column", "row"), ("focal length", "distortion")
+_PRIORS: Mapping[tuple[str, str], str] = {
+    ("range", ""): "range_bias_m",
+    ("range", "range"): "range_scale",
+    ("azimuth", "azimuth"): "azimuth_scale",
+    ("elevation", "elevation"): "elevation_scale",
+    ("elevation", "azimuth"): "elevation_lean",
+    ("column", ""): "click_right_px",
+    ("row", ""): "click_down_px",
+}
+"""The systematic errors, whose priors the options state, that are causes too if the pairs put them beyond these."""
+_ABSORBED = {("azimuth", ""), ("elevation", "")}  # by the rotation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cause:
+    """One row of the table, as it is for these pairs.
+
+    Attributes:
+        quantity: "range", "azimuth", "elevation", "column", "row", "focal length", "distortion"; of a step "turn", "move" or
+            "range step".
+        shape: a key of the shapes, or "time"; empty for a constant and for steps.
+        columns: (n, 2, k) d whitened pixel / d cause, of the inliers in order of time.
+        largest: the factor at the placement where the cause does most.
+        split: of a step, how many placements are before it; else 0.
+    """
+
+    quantity: str
+    shape: str
+    columns: np.ndarray
+    largest: float = 1.0
+    split: int = 0
+
+    @property
+    def kind(self) -> str:
+        """A key of the shares of the level."""
+        if self.split:
+            return self.quantity
+        return "stated" if self.quantity in _OF_LENS or (self.quantity, self.shape) in _PRIORS else "other"
+
+    @property
+    def rarity(self) -> float:
+        """How much less likely it is than a wrong focal length or a step before any pair, as twice a logarithm."""
+        if self.split or self.quantity == "focal length":
+            return 0.0
+        return 6.0 if self.quantity in _OF_CLICKS and self.shape else 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tested:
+    """A cause with its estimate (k,), standard deviations (k,), statistic and probability of one as large in a sound set."""
+
+    cause: Cause
+    amount: tuple[float, ...]
+    sigma: tuple[float, ...]
+    statistic: float
+    chance: float
+
+
+def causes(fit: SolvedFit) -> list[DataWarning]:
+    """Name the cause that explains most of the residuals, with those it cannot be told from; nothing if none is significant."""
+    if fit.inliers.sum() < _LEAST_PAIRS or fit.measurements.flat:
+        return []
+    tested = tested_causes(fit)
+    significant = [test for test in tested if test.chance < LEVEL]
+    best = max(
+        significant, key=lambda test: test.statistic - _COST * len(test.amount) - test.cause.rarity, default=None
+    )
+    if best is None:
+        return []
+    beside = [
+        test
+        for test in tested
+        if test is not best
+        and not test.cause.split
+        and test.statistic > best.statistic - _BESIDE
+        and len(test.amount) == 1
+    ]
+    beside.sort(key=lambda test: -test.statistic)
+    return [_warning(fit, best, [] if best.cause.split else beside)]
+
+
+def tested_causes(fit: SolvedFit) -> list[Tested]:
+    """Test every cause; the chances are those among all of them."""
+    order = _order(fit)
+    null = _Null.of(fit, order)
+    kinds: dict[str, list[Tested]] = {}
+    for cause in (*_constant_causes(fit, order), *_steps(fit, order)):
+        if tested := null.test(cause, _SMOOTH_VARIANCE_OF_STEPS if cause.split else _SMOOTH_VARIANCE):
+            kinds.setdefault(cause.kind, []).append(tested)
+    return [
+        replace(test, chance=min(1.0, max(1.0, _DIFFERENT * len(tests)) * test.chance / _SHARES[kind]))
+        for kind, tests in kinds.items()
+        for test in tests
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Null:
+    """What is known of the residuals without any cause.
+
+    Attributes:
+        residual: (m,) of the inliers and the priors, whitened and weighted.
+        explained: (m, u) orthonormal columns of what pose and estimated errors can explain.
+        uncertain: (m, w) columns of the widening errors, each of one standard deviation.
+        smooth: (n, 2, c) square root of the covariance of smooth angle errors as large as the noise.
+        root: (n,) of the weights.
+        freedom: degrees of freedom of the noise; 0 if it was not estimated.
+    """
+
+    residual: Values
+    explained: np.ndarray
+    uncertain: np.ndarray
+    smooth: np.ndarray
+    root: Values
+    freedom: float
+
+    @classmethod
+    def of(cls, fit: SolvedFit, order: Indices) -> "_Null":
+        """Gather it from a fit, for the inliers in an order."""
+        refined = fit.refined
+        residual, jacobian = weighted_rows(refined, order)
+        priors, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
+        root = np.sqrt(refined.weights[order])
+        widening = widening_rows(refined)[order] * root[:, None, None]
+        sigma = np.array([error.sigma for error in refined.measurements.errors.widening])
+        uncertain = np.zeros((len(residual) + len(priors), len(sigma)))
+        uncertain[: len(residual)] = (widening * sigma).reshape(len(residual), -1)
+        return cls(
+            np.concatenate([residual, priors]),
+            np.linalg.qr(np.concatenate([jacobian, prior_jacobian]))[0],
+            uncertain,
+            smooth_rows(refined, order, float(_SMOOTH_RAD)).reshape(len(order), 2, -1),
+            root,
+            refined.degrees_of_freedom,
+        )
+
+    def test(self, cause: Cause, smooth_variance: float) -> Tested | None:
+        """Evaluate equation (8); None if pose and estimated errors leave nothing of the cause."""
+        count = len(self.root)
+        gain = np.zeros((len(self.residual), cause.columns.shape[2]))
+        gain[: 2 * count] = (cause.columns * self.root[:, None, None]).reshape(2 * count, -1)
+        whole = np.linalg.norm(gain, axis=0)
+        gain = gain - self.explained @ (self.explained.T @ gain)
+        if (np.linalg.norm(gain, axis=0) <= _LEAST_OWN * whole).any():
+            return None
+        axes, triangle = np.linalg.qr(gain)
+        score = axes.T @ self.residual
+        left = max(self.freedom - float(score @ score), _LEAST_LEFT * self.freedom)
+        width = len(score)
+        noise = left / (self.freedom - width) if self.freedom > width + 1.0 else 1.0
+        known = axes.T @ self.uncertain
+        each = np.einsum("nrk,nrs->nks", axes[: 2 * count].reshape(count, 2, -1), self.smooth)
+        shared = each.sum(axis=0)
+        added, turned = np.linalg.eigh(shared @ shared.T - np.einsum("nks,nts->kt", each, each))
+        smooth = (turned * np.maximum(added, 0.0)) @ turned.T
+        variance = noise * np.eye(width) + known @ known.T + smooth_variance * smooth
+        statistic = float(score @ np.linalg.solve(variance, score))
+        back = np.linalg.inv(triangle)
+        sigma = np.sqrt(np.diag(back @ variance @ back.T))
+        return Tested(
+            cause,
+            tuple((back @ score).tolist()),
+            tuple(sigma.tolist()),
+            statistic,
+            _chance(statistic, self.freedom, float(width)),
+        )
+
+
+_LEAST_OWN = 1e-6  # of a column that is left beside pose and estimated errors
+
+
+def _chance(statistic: float, freedom: float, count: float) -> float:
+    from scipy.special import chdtrc, fdtrc
+
+    return float(
+        fdtrc(count, freedom - count, statistic / count) if freedom > count + 1.0 else chdtrc(count, statistic)
+    )
+
+
+def _constant_causes(fit: SolvedFit, order: Indices) -> Iterator[Cause]:
+    refined = fit.refined
+    polar, whitening = refined.polar[:, order], refined.model.whitening[order]
+    columns = {name: refined.model.point_jacobian[order][:, :, axis] for axis, name in enumerate(_OF_RADAR)} | {
+        name: whitening[:, :, axis] for axis, name in enumerate(_OF_CLICKS)
+    }
+    timed = {"time": np.linspace(-0.5, 0.5, len(order))} if _is_timed(fit) else {}
+    factors = {name: shape(polar) for name, shape in _SHAPES.items()} | timed
+    for quantity in columns:
+        for shape, factor in factors.items():
+            if (quantity, shape) not in _ABSORBED:
+                largest = float(factor[np.abs(factor).argmax()])
+                yield Cause(quantity, shape, (columns[quantity] * factor[:, None])[:, :, None], largest)
+    camera = fit.measurements.camera
+    offset_px = fit.measurements.pixels_px[order] - camera.matrix_px[:2, 2]
+    share = ((offset_px / camera.matrix_px[[0, 1], [0, 1]]) ** 2).sum(axis=1)
+    yield Cause("focal length", "", whitening @ offset_px[:, :, None])
+    reach_px = float((share * np.linalg.norm(offset_px, axis=1)).max())
+    yield Cause("distortion", "", whitening @ (offset_px * share[:, None])[:, :, None], reach_px)
+
+
+def _steps(fit: SolvedFit, order: Indices) -> Iterator[Cause]:
+    """Yield what may happen between two placements in time."""
+    times, count = _times(fit)[order], len(order)
+    model = fit.refined.model
+    of_pose = model.jacobian[order][:, :, :6]
+    kinds = {
+        "turn": of_pose[:, :, 3:],
+        "move": of_pose[:, :, :3],
+        "range step": model.point_jacobian[order][:, :, :1],
+    }
+    tried = np.linspace(_LEAST_PLACEMENTS, count - _LEAST_PLACEMENTS, _MOST_SPLITS).round().astype(np.int64)
+    for split in np.unique(tried).tolist():
+        if 0 < split < count and 0 < times[split - 1] < times[split]:
+            after = (np.arange(count) >= split)[:, None, None]
+            yield from (Cause(kind, "", columns * after, split=split) for kind, columns in kinds.items())
+
+
+def _order(fit: SolvedFit) -> Indices:
+    """Return the inliers in order of time."""
+    inliers = np.flatnonzero(fit.inliers)
+    return np.asarray(inliers[np.argsort(_times(fit)[inliers], kind="stable")])
+
+
+def _is_timed(fit: SolvedFit) -> bool:
+    return any(time is not None for time in fit.times)
+
+
+def _times(fit: SolvedFit) -> np.ndarray:
+    """Return the times (n,) of the pairs, 0 where unknown; of pairs without any the numbers at the end of their ids, unless these
+    follow a column: pairs sorted by range are in no order of time."""
+    if _is_timed(fit):
+        return np.array([time or 0 for time in fit.times], dtype=np.int64)
+    ends = [re.search(r"(\d{1,9})$", name) for name in fit.ids]
+    numbers = np.array([int(end[1]) if end else 0 for end in ends], dtype=np.int64)
+    columns = np.column_stack([fit.refined.polar.T, fit.measurements.pixels_px, fit.measurements.rays])
+    steps = np.diff(columns[np.argsort(numbers, kind="stable")], axis=0)
+    is_sorted = ((steps >= 0.0).all(axis=0) | (steps <= 0.0).all(axis=0)).any()
+    return np.zeros_like(numbers) if is_sorted else numbers
+
+
+def _warning(fit: SolvedFit, test: Tested, beside: Sequence[Tested]) -> DataWarning:
+    cause = test.cause
+    if cause.split:
+        return DataWarning("shared-error-suspected", _step_facts(fit, test))
+    others = {"beside": [(one.cause.quantity, one.cause.shape) for one in beside[:_MOST_BESIDE]]}
+    amount, sigma = test.amount[0], test.sigma[0]
+    if cause.quantity == "focal length":
+        return DataWarning("intrinsics-suspected", {"focal_length": amount, "sigma": sigma} | others)
+    if cause.quantity == "distortion":
+        size_px = {"distortion_px": abs(amount) * cause.largest, "sigma": sigma * cause.largest}
+        return DataWarning("intrinsics-suspected", size_px | others)
+    if cause.quantity in _OF_RADAR:  # what is reported too large makes the residuals smaller
+        amount = -amount
+    prior = _PRIORS.get((cause.quantity, cause.shape))
+    errors = [error for error in fit.uncertainty.systematic_errors if error.name == prior]
+    if errors:
+        facts = {"error": errors[0].name, "value": amount, "sigma": sigma, "prior_sigma": errors[0].prior_sigma}
+        return DataWarning("shared-error-suspected", facts | others)
+    facts = {
+        "quantity": cause.quantity,
+        "shape": cause.shape,
+        "largest": amount * cause.largest,
+        "largest_sigma": sigma * abs(cause.largest),
+    }
+    return DataWarning("shared-error-suspected", facts | others)
+
+
+_MOST_BESIDE = 3  # other causes that are said
+
+
+def _step_facts(fit: SolvedFit, test: Tested) -> Facts:
+    order, split = _order(fit), test.cause.split
+    return {
+        "step": test.cause.quantity,
+        "size": float(np.linalg.norm(test.amount)),
+        "before": fit.ids[order[split - 1]],
+        "after": fit.ids[order[split]],
+        "by_number": not _is_timed(fit),
+    }
