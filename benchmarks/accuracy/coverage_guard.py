@@ -22,7 +22,7 @@ _CASES = tuple(
     for noise in ("ti", "imaging")
     for tape_m in (0.01, None)
 )
-_TRIALS, _SMOOTH_TRIALS, _CHUNK = 190, 20, 10
+_TRIALS, _SMOOTH_TRIALS, _CHUNK = 130, 40, 10
 _LOW, _HIGH = 0.90, 0.99
 
 
