@@ -279,8 +279,8 @@ def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
     apart = (points[pairs[:, 1]] - points[pairs[:, 0]])[:, axes]
     long_m = np.linalg.norm(apart, axis=1)
     pairs, normals = pairs[long_m > 10.0 * _PLANE_M], (apart / long_m[:, None])[long_m > 10.0 * _PLANE_M]
-    few, many = sorted(_repeats(points[:, axis], step_m) for axis in (0, 1))
-    if len(pairs) < _FEWEST or len(axes) < 2 or few > max(_SURE, 0.1 * many):  # bins of both x and y are a grid
+    grid = min(_repeats(points[:, axis], step_m) for axis in (0, 1)) > len(points)  # of both x and y: a nat a return
+    if len(pairs) < _FEWEST or len(axes) < 2 or grid or step_m > _PLANE_M:
         return np.zeros(3), 0.0
     middles = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])[:, axes]
     offsets = (normals * middles).sum(axis=1)
