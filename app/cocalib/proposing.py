@@ -18,12 +18,13 @@ from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.appearance import Appearance, appearance_of, likeness_elsewhere, with_appearance
-from calib_core.proposing.common_width import REFLECTOR_M, CommonWidth, at_width, common_width
 from calib_core.proposing.dwell_views import has_changed
 from calib_core.words.outcomes import outcome_remark
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
 
+REFLECTOR_M = 0.24
+"""Width of the reflector if nothing is said of it [m]."""
 _BESIDE = 0.6
 """A click farther than so many widths from everything that changed is not on the reflector, if one is seen there."""
 _LEAST_PLACEMENTS = 3
@@ -48,7 +49,7 @@ def find_proposals(
     *,
     confirmed: Sequence[ReflectorClick] = (),
     placements: Sequence[Placement] | None = None,
-    reflector_m: float | None = None,
+    reflector_m: float = REFLECTOR_M,
     progress: Callable[[ViewProgress | str], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[tuple[DwellView, ...], Proposals] | Unsolvable:
@@ -60,7 +61,7 @@ def find_proposals(
         options: of the calibration.
         confirmed: clicks that a person placed or accepted; each shows what the reflector looks like.
         placements: where the radar saw something stand still, if that is known already.
-        reflector_m: width of the reflector [m], if it is known; else the one that suits all placements is found.
+        reflector_m: width of the reflector [m].
         progress: called with what is done next, in words, and while the images are looked at.
         stopped: asked often; once it is true there are no proposals.
 
@@ -80,11 +81,10 @@ def find_proposals(
     missing = _missing(placements, recording)
     if missing is not None:
         return missing
-    thought_m = REFLECTOR_M if reflector_m is None else reflector_m
-    views = dwell_views(placements, recording, camera, reflector_m=thought_m, progress=progress, stopped=stopped)
+    views = dwell_views(placements, recording, camera, reflector_m=reflector_m, progress=progress, stopped=stopped)
     if stopped():
         return _STOPPED
-    return proposed_again(views, recording, camera, options, confirmed=confirmed, reflector_m=reflector_m)
+    return proposed_again(views, recording, camera, options, confirmed=confirmed)
 
 
 def proposed_again(
@@ -94,9 +94,8 @@ def proposed_again(
     options: CalibrationOptions,
     *,
     confirmed: Sequence[ReflectorClick] = (),
-    reflector_m: float | None = None,
 ) -> tuple[tuple[DwellView, ...], Proposals]:
-    """Propose from the views of the dwells, at the width that they have in common.
+    """Propose from the views of the dwells: cheap enough to be called after each confirmed click.
 
     Args:
         views: of all placements, as `dwell_views` found them.
@@ -104,18 +103,14 @@ def proposed_again(
         camera: the intrinsics.
         options: of the calibration.
         confirmed: clicks that a person placed or accepted; those that do not count show nothing.
-        reflector_m: width of the reflector [m], if it is known.
 
     Raises:
         CalibrationError: a frame cannot be read.
     """
     counting = [click for click in confirmed if click.counts]
-    width = common_width(views, camera, options, reflector_m=reflector_m, confirmed=counting)
-    if width.is_probable:
-        views = [at_width(view, frames, camera, width.reflector_m) for view in views]
     looks = appearances_of(counting, views, frames, camera)
     found = with_appearance(views, looks, frames, camera)
-    return found, proposals_of(found, camera, options, confirmed=counting, width=width)
+    return found, proposals_of(found, camera, options, confirmed=counting)
 
 
 def appearances_of(
@@ -211,8 +206,6 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
 _FIRST, _EVERY = 4, 4
 """From so many dwells on there may be proposals: after each dwell until there is one, then after every fourth."""
-_SURE = 0.9
-"""Probability that images and radar agree by no chance, from which on there are proposals before all images were looked at."""
 _LOOKS = 3
 """The first clicks show what the reflector looks like; with these, further ones tell where it is, but nothing new of its look."""
 _log = logging.getLogger(__name__)
@@ -322,7 +315,6 @@ class ProposingJob:
         self._appearances: tuple[tuple[object, ...], list[Appearance]] = ((), [])
         self._carried: list[DwellView] = []
         self._carried_from: list[tuple[object, ...]] = []
-        self._width: tuple[tuple[object, ...], CommonWidth | None] = ((), None)
 
     @property
     def snapshot(self) -> ProposingSnapshot:
@@ -389,7 +381,6 @@ class ProposingJob:
                 self._set(wish, Proposals(()), stage="failed", problem=str(said.message), hint=str(said.hint))
                 return
             self._seen, self._seen_for = found[0], wish
-            self._width = ((), found[1].width)
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
             self._appearances = ((), [])
         self._carry(wish)
@@ -408,7 +399,7 @@ class ProposingJob:
                 self._carried, self._carried_from = list(self._seen), [key] * len(self._seen)
             left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
             if newest is not proposed_for or since >= _EVERY or not left:
-                self._propose(newest, self._carried, self._common_width(newest, key))
+                self._propose(newest, self._carried)
                 proposed_for, since = newest, 0
                 left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
             done = len(self._seen) - len(left)
@@ -417,8 +408,6 @@ class ProposingJob:
                 return
             number, since = left[0], since + 1
             seen = self._seen[number : number + 1]
-            if (width := self._width[1]) is not None and width.is_probable:
-                seen = tuple(at_width(one, self._recording, newest.camera, width.reflector_m) for one in seen)
             self._carried[number : number + 1] = with_appearance(seen, looks, self._recording, newest.camera)
             self._carried_from[number] = key
 
@@ -434,40 +423,17 @@ class ProposingJob:
         if wish is None or isinstance(progress, str):
             return
         waiting = not self._snapshot.proposals.ranked
-        if progress.done >= _FIRST and (progress.done & (progress.done - 1) == 0 or not waiting):
-            self._first(wish, progress)
+        if progress.done >= _FIRST and (waiting or progress.done % _EVERY == 0):
+            self._propose(wish, progress.views, done=progress.done, count=progress.count)
         else:
             self._set(wish, done=progress.done, count=progress.count)
 
-    def _first(self, wish: ProposingWish, progress: ViewProgress) -> None:
-        """Propose while images are still looked at, once what is offered will hardly be taken back; chance is judged seldom."""
-        if wish.camera is None:
-            return
-        if progress.done & (progress.done - 1) == 0:
-            self._width = ((), common_width(progress.views, wish.camera, wish.options, confirmed=wish.confirmed))
-        width = self._width[1]
-        if width is None or width.probability < _SURE:
-            self._set(wish, done=progress.done, count=progress.count)
-        elif progress.done % _EVERY == 0:
-            views = [at_width(view, self._recording, wish.camera, width.reflector_m) for view in progress.views]
-            self._propose(wish, views, width, done=progress.done, count=progress.count)
-
-    def _common_width(self, wish: ProposingWish, key: tuple[object, ...]) -> CommonWidth | None:
-        """Return the width and what chance reaches with the clicks of the wish; without them if that is sure already."""
-        known_for, width = self._width
-        if known_for != key and wish.camera is not None and (width is None or width.probability < _SURE):
-            width = common_width(self._seen, wish.camera, wish.options, confirmed=wish.confirmed)
-            self._width = (key, width)
-        return width
-
-    def _propose(
-        self, wish: ProposingWish, views: Sequence[DwellView], width: CommonWidth | None, **changes: object
-    ) -> None:
+    def _propose(self, wish: ProposingWish, views: Sequence[DwellView], **changes: object) -> None:
         if wish.camera is None:
             return
         self._wait()
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
-        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed, width=width)
+        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
         self._set(wish, proposals, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:

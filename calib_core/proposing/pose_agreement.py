@@ -10,8 +10,10 @@ Several rough poses are refined at once (expectation maximization): each candida
 given the pose; each step then solves for rotation, camera position and the scales of the radar's angles, with the mounting as
 prior. Tolerances shrink from step to step, and the noise level that explains a recording best is kept.
 
-A person who goes from place to place is seen by the radar and in the images alike, but is much taller than wide; and where a
-reflector is large enough in the image its three sheets meet in a point, and a person's clothes rarely do.
+How far chance goes is measured on the recording itself: the radar's positions are dealt to other dwells, neighbours
+in time too, as whoever carries a reflector down an aisle would be taken for right by the order alone. And a person
+who goes from place to place is seen by the radar and in the images alike; but where a reflector is large enough in
+the image its three sheets meet in a point, and a person's clothes rarely do.
 """
 
 from collections.abc import Sequence
@@ -23,7 +25,7 @@ import numpy as np
 from calib_core.arrays import Flags, Indices, Points2, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.proposing.candidate_rays import CandidateRays
-from calib_core.proposing.dwell_views import DwellView, is_upright
+from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
 
 NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
@@ -178,17 +180,6 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
     )
 
 
-def quick_poses(rays: CandidateRays, prior: MountingPrior) -> RoughPoses:
-    """Return the few best rough poses that few trials find, about every second start.
-
-    Args:
-        rays: of all dwells.
-        prior: of the mounting.
-    """
-    few = replace(prior, starts_m=prior.starts_m[len(prior.starts_m) > 1 :: 2])
-    return rotation_consensus(rays, few, most=_QUICK_MOST, tried=_QUICK_TRIED)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ClicksAgreement:
     """What the clicks alone say of each candidate, through the pose that they leave open.
@@ -300,8 +291,6 @@ _MOST_PAIRED = 600
 """Candidates of which any two give a rotation; of more, so many are drawn by their odds."""
 
 _MOST_TRIED = 6000
-_QUICK_TRIED, _QUICK_MOST = 400, 2
-"""The same, and how many of them are returned, where only the score counts."""
 
 _MOST_PREDICTIONS = 1_000_000
 """Rotations times candidates that are compared."""
@@ -322,21 +311,18 @@ _SAME_RAD, _OTHER_RAD = np.radians(1.2), np.radians(4.0)
 """Between the better half of the rotations that are returned, and between the others."""
 
 
-def rotation_consensus(
-    rays: CandidateRays, prior: MountingPrior, *, most: int = 24, tried: int = _MOST_TRIED, seed: int = 0
-) -> RoughPoses:
+def rotation_consensus(rays: CandidateRays, prior: MountingPrior, *, most: int = 24, seed: int = 0) -> RoughPoses:
     """Find the rotations that explain the most dwells; none if no two dwells agree within the mounting's reach.
 
     Args:
         rays: of all dwells.
         prior: of the mounting.
         most: how many to return.
-        tried: how many to compare at most, about each start.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
     poseses: list[RoughPoses] = []
     for centre in prior.starts_m:
-        rotations = _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))
+        rotations = _from_two_dwells(rays, prior, centre, np.random.default_rng(seed))
         scores = _rotation_scores(rays, prior, centre, rotations)
         kept = _best_apart(rotations, scores, most)
         centres = np.tile(centre, (len(kept), 1))
@@ -357,7 +343,7 @@ def _directions(rays: CandidateRays, centre: np.ndarray) -> np.ndarray:
 
 
 def _from_two_dwells(
-    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, tried: int, rng: np.random.Generator
+    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
     """Return the rotations (h, 3, 3) that two candidates of two dwells give, those within the mounting's reach."""
     directions = _directions(rays, centre)
@@ -381,7 +367,7 @@ def _from_two_dwells(
     )
     cosine = 0.5 * (np.einsum("hij,ij->h", rotations, prior.rotation) - 1.0)
     near = np.flatnonzero(cosine > np.cos(MOST_TURNED_RAD))
-    most = min(tried, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
+    most = min(_MOST_TRIED, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
     if len(near) > most:
         odds = rays.odds[dwell, which]
         likely = odds[one[near]] * odds[other[near]]
@@ -580,36 +566,66 @@ def _true_positions(rays: CandidateRays, poses: RoughPoses) -> tuple[np.ndarray,
     return points, np.broadcast_to(by_scale, (len(poses), *by_scale.shape))
 
 
-_OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
-"""Share of the places with an apex: of reflectors wide enough to show it 0.92 in simulated recordings, of people 0.1 to 0.4."""
+_DEALS = 16
+_SHIFTS = (1, -1, 2, -2)
+_REFINED = 8
 
-_UPRIGHT_PERSON, _UPRIGHT_REFLECTOR = 0.85, 0.15
-"""Share of the places without an apex that are much taller than wide: 23 of 26 people in simulated recordings, and a reflector
-on a stand that is as wide as itself, or one with somebody behind it."""
+_SIGMAS = 4.0
+"""Standard deviations above the mean that chance reaches in about one of 10,000 recordings."""
+
+
+def chance_scores(rays: CandidateRays, prior: MountingPrior, *, seed: int = 0) -> Values:
+    """Return the scores (d,) of the best poses for wrong deals of the radar's positions; at least three dwells are needed."""
+    n = len(rays)
+    rng = np.random.default_rng(seed)
+    deals = [_deal(rng, n) for _ in range(_DEALS)]
+    deals += [np.roll(np.arange(n), shift) for shift in _SHIFTS if shift % n]
+    found = (pose_agreement(rays.with_radar_of(rows), prior, most=_REFINED) for rows in deals)
+    return np.array([0.0 if one is None else one.score for one in found])
+
+
+def chance_score(scores: Values) -> float:
+    """Return the score that chance hardly exceeds: beyond all deals, and beyond their spread."""
+    return float(max(scores.max(), scores.mean() + _SIGMAS * scores.std()))
+
+
+def _deal(rng: np.random.Generator, n: int) -> Indices:
+    """Draw a permutation that leaves nothing in its place."""
+    while True:
+        rows = rng.permutation(n)
+        if (rows != np.arange(n)).all():
+            return np.asarray(rows)
+
+
+_WIDE_ENOUGH_PX = 16.0
+"""Width of a reflector whose apex can be seen."""
+
+_OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
+"""Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
 
 _BEFORE = 1.0
 """Log-odds before any image: most recordings contain a reflector."""
 
+_LEAST_SEEN = 3
+"""Fewer places of that width say nothing."""
+
 _PRESENT = 0.5
 
 
-def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
-    """Return the log-odds that what stood there is a reflector and not a person: an apex speaks for it, its lack not
-    against it; infinite where nothing is told.
+def apex_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
+    """Return the log-odds that what stood there is a reflector; infinite where too little is large enough to tell.
 
     Args:
         views: as the agreement was found for, without confirmed clicks.
         agreement: its most probable candidates are looked at.
     """
-    log_odds, told = _BEFORE, False
-    for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
-        if probability[row] < _PRESENT:
+    log_odds, count = _BEFORE, 0
+    for i, view in enumerate(views):
+        row = int(agreement.likeliest[i])
+        if agreement.probability[i, row] < _PRESENT or not view.width_px >= _WIDE_ENOUGH_PX:
             continue
-        candidate = view.candidates[row]
-        upright = is_upright(view, candidate.pixel_px)
-        told |= candidate.has_apex or upright is not None
-        if candidate.has_apex:
-            log_odds += float(np.log(_OF_REFLECTOR / _OF_OTHERS))
-        elif upright is not None:
-            log_odds += float(np.log(_UPRIGHT_REFLECTOR / _UPRIGHT_PERSON)) * (1.0 if upright else -1.0)
-    return log_odds if told else float("inf")
+        shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
+        seen = shares if view.candidates[row].has_apex else 1.0 - shares
+        log_odds += float(np.log(seen[0] / seen[1]))
+        count += 1
+    return log_odds if count >= _LEAST_SEEN else float("inf")

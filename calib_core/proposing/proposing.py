@@ -11,15 +11,14 @@ from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
-from calib_core.proposing.common_width import CommonWidth, common_width
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     ClicksAgreement,
     PoseAgreement,
+    apex_log_odds,
     clicks_agreement,
     pose_agreement,
-    reflector_log_odds,
 )
 from calib_core.proposing.proposals import Proposal, Proposals
 
@@ -27,6 +26,11 @@ LEAST_CONFIDENCE = 0.5
 """What is less probably the reflector is not proposed."""
 _WEAK, _UNSURE = 0.8, 0.9
 """A proposal of less confidence comes with a reason, and with one if its apex is not seen."""
+_CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
+"""Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the images
+of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
+_CHANCE_AFTER_CLICK = 5.0
+"""The same once a click says where one dwell lies: fewer poses are left that could agree by chance."""
 _TEMPER = 1.6
 """By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
 _LIKE_A_CLICK = 0.8
@@ -58,7 +62,6 @@ def proposals_of(
     options: CalibrationOptions,
     *,
     confirmed: Sequence[ReflectorClick] = (),
-    width: CommonWidth | None = None,
 ) -> Proposals:
     """Rank what the images show for each dwell; what is probably wrong is not proposed.
 
@@ -67,21 +70,17 @@ def proposals_of(
         camera: the intrinsics.
         options: of the calibration; nominal mounting and measured camera position are used.
         confirmed: clicks that a person placed or accepted so far; each covers its dwell.
-        width: of the reflector, and how far chance goes, if that is known already.
     """
     if not views:
         return Proposals(())
     clicks = [click for click in confirmed if click.counts]
-    if width is None:
-        width = common_width(views, camera, options, confirmed=clicks)
     rays = candidate_rays(views, camera, options, confirmed=clicks)
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
-    judged = _Judged.of(views, rays, agreement, by_clicks, width)
+    judged = _Judged.of(views, rays, agreement, by_clicks)
     covered = _clicks_by_dwell(rays, judged, len(clicks))
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
-    ranges_m = {id(click): float(np.linalg.norm(placement.position_radar_m)) for placement, click in marks}
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
     for i, view in enumerate(views):
@@ -90,14 +89,14 @@ def proposals_of(
         proposal = judged.proposal(i)
         if proposal is None:
             unproposed.append((view.placement, judged.reason(i)))
-        elif (mark := _marked(proposal, view, marks, clicks)) is None:
+        elif (marked := _marked(proposal, view, marks)) is None:
             ranked.append(proposal)
         else:
-            at = f", at the placement of {ranges_m[id(mark)]:.1f} m" if id(mark) in ranges_m else ""
-            unproposed.append((view.placement, f"its place is marked already{at}"))
+            range_m = np.linalg.norm(marked.position_radar_m)
+            unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
     if agreement is None:
-        return Proposals(tuple(ranked), tuple(unproposed), width=width)
+        return Proposals(tuple(ranked), tuple(unproposed))
     return Proposals(
         tuple(ranked),
         tuple(unproposed),
@@ -105,7 +104,6 @@ def proposals_of(
         agreement.agreeing(rays),
         agreement.agreeing_with_rival(rays),
         agreement.trials,
-        width,
     )
 
 
@@ -125,18 +123,13 @@ def _clicks_by_dwell(rays: CandidateRays, judged: "_Judged", clicks: int) -> dic
     return found
 
 
-def _marked(
-    proposal: Proposal,
-    view: DwellView,
-    own: Sequence[tuple[Placement, ReflectorClick]],
-    clicks: Sequence[ReflectorClick],
-) -> ReflectorClick | None:
-    """Return the click on the proposed place, of the same time or of a placement at the same time: nothing is offered twice."""
-    at_once = [click for other, click in own if other.start <= view.placement.end and view.placement.start <= other.end]
-    meanwhile = [click for click in clicks if view.placement.start <= click.image_time <= view.placement.end]
-    for click in (*at_once, *meanwhile):
-        if np.hypot(*(proposal.pixel_px - [click.u_px, click.v_px])) <= 0.5 * view.width_px:
-            return click
+def _marked(proposal: Proposal, view: DwellView, own: Sequence[tuple[Placement, ReflectorClick]]) -> Placement | None:
+    """Return the placement at the same time with a click on the proposed place: the radar saw one reflector twice."""
+    for placement, click in own:
+        apart_px = np.hypot(*(proposal.pixel_px - [click.u_px, click.v_px]))
+        overlaps = placement.start <= view.placement.end and view.placement.start <= placement.end
+        if overlaps and apart_px <= 0.5 * view.width_px:
+            return placement
     return None
 
 
@@ -171,14 +164,14 @@ class _Judged:
         rays: CandidateRays,
         agreement: PoseAgreement | None,
         by_clicks: ClicksAgreement | None,
-        width: CommonWidth,
     ) -> "_Judged":
         """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None:
-            trusted = agreement.pose_probability * width.probability
+            above = (agreement.score - (_CHANCE_SCORE if by_clicks is None else _CHANCE_AFTER_CLICK)) / _CHANCE_STEP
+            trusted = agreement.pose_probability * _logistic(above)
             if by_clicks is None:
-                reflectors = _logistic(reflector_log_odds(views, agreement))
+                reflectors = _logistic(apex_log_odds(views, agreement))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:

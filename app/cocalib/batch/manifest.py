@@ -34,7 +34,7 @@ class ManifestRow:
         auto: place clicks without a person where there are none.
         camera: file of intrinsics; None for the recording's own.
         rescale_camera: scale these intrinsics to the recorded images, if they are the calibrated ones resized.
-        reflector_m: width of the reflector as the camera sees it [m], for auto; None if it is not known.
+        reflector_m: width of the reflector as the camera sees it [m], for auto.
         boxes: file of boxes to evaluate by; None without.
         topics: which topics, and how they are read.
         options: of the calibration, the tape-measured camera position included.
@@ -56,7 +56,7 @@ class ManifestRow:
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     exports: tuple[str, ...] = ()
     rescale_camera: bool = False
-    reflector_m: float | None = None
+    reflector_m: float = 0.24
     place: str = ""
 
     @property
@@ -90,7 +90,7 @@ class SharedDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     auto: bool = False
     camera: str | None = None
     rescale_camera: bool = False
-    reflector_m: Annotated[float, Meta(ge=0.02, le=2.0)] | None = None
+    reflector_m: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.24
     camera_position_m: tuple[float, float, float] | None = None
     camera_position_sigma_m: float | None = None
     exports: tuple[str, ...] = ()

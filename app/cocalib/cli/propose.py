@@ -35,7 +35,7 @@ def propose(
     *,
     camera: CameraFlags,
     clicks_file: "Path | None",
-    reflector_m: float | None,
+    reflector_m: float,
 ) -> int:
     """Find the proposals and print them; return the exit code.
 
@@ -47,7 +47,7 @@ def propose(
         shown: where they go.
         camera: intrinsics.
         clicks_file: of those that a person placed: one shows what the reflector looks like.
-        reflector_m: width of the reflector as the camera sees it, if it is known.
+        reflector_m: width of the reflector as the camera sees it.
     """
     from calib_core.measurements import Unsolvable
     from cocalib.proposing import find_proposals
@@ -72,7 +72,7 @@ def propose(
             return explain_unsolvable(found, what="no proposals")
         if not found[1].ranked and not any(click.counts for click in clicks):
             return _explain_nothing(found[1], recording)
-        return _deliver(shown, *found, recording, clicks)
+        return _deliver(shown, *found, recording, clicks, reflector_m)
 
 
 def _explain_nothing(proposals: "Proposals", recording: "Recording") -> int:
@@ -91,10 +91,10 @@ def _deliver(
     proposals: "Proposals",
     recording: "Recording",
     clicks: "Sequence[ReflectorClick]",
+    reflector_m: float,
 ) -> int:
     """Print the proposals, and write them to the file if one is given; return the exit code."""
     from calib_core.measurements import TimeNs
-    from calib_core.proposing.common_width import REFLECTOR_M
     from calib_core.proposing.proposals import ProposalSource, proposals_json
     from cocalib.cli.proposal_table import proposal_lines
     from cocalib.proposing import beside_the_reflector
@@ -111,7 +111,7 @@ def _deliver(
         recording=tuple(name_text(path.name) for path in recording.paths),
         image_topic=recording.image_topic,
         radar_topics=recording.radar_topics,
-        reflector_m=REFLECTOR_M if proposals.width is None else proposals.width.reflector_m,
+        reflector_m=reflector_m,
         confirmed=confirmed,
     )
     text = proposals_json(proposals, views, source)

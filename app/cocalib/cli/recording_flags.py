@@ -123,13 +123,13 @@ class CameraFlags:
 _LEAST_M, _MOST_M = 0.02, 2.0
 
 
-def checked_reflector_m(reflector_m: float | None) -> float | None:
-    """Return the width of the reflector; None if it is not known.
+def checked_reflector_m(reflector_m: float) -> float:
+    """Return the width of the reflector.
 
     Raises:
         InputError: no corner reflector has it.
     """
-    if reflector_m is not None and not _LEAST_M <= reflector_m <= _MOST_M:
+    if not _LEAST_M <= reflector_m <= _MOST_M:
         raise InputError(
             f"--reflector-m {reflector_m:g}: give the width of the reflector as the camera sees it, "
             f"from {_LEAST_M:g} to {_MOST_M:g} m"

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording
     from cocalib.solving.automatic import PlacedClicks
 
+_REFLECTOR_M = 0.24
+
 
 @dataclass(frozen=True, slots=True)
 class Solve:
@@ -63,8 +65,8 @@ class Solve:
     """Solve nothing: list where the reflector probably stood, for a person or a script to confirm; --out keeps it as JSON."""
     clicks_out: OutFile = None
     """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
-    reflector_m: Annotated[float | None, MORE] = None
-    """With --auto or --propose: width of the reflector as the camera sees it [m]; found if it is not given."""
+    reflector_m: Annotated[float, MORE] = _REFLECTOR_M
+    """With --auto or --propose: width of the reflector as the camera sees it [m]."""
     json: MoreSwitch = False
     """With --propose: print everything as JSON (cocalib/proposals-1)."""
     pairs: File = None
@@ -98,7 +100,7 @@ class Solve:
         """
         if self.json:
             raise InputError("--json applies with --propose only; a calibration is JSON already")
-        if not self.auto and (self.clicks_out is not None or self.reflector_m is not None):
+        if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
         if self.pairs is not None:
             if self.recorded.recording or self.clicks or self.auto:

@@ -16,7 +16,7 @@ from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.results.confirmation import unconfirmed_warning
 from calib_core.results.verdict import verdict_on
-from cocalib.proposing import RecordedFrames, find_proposals
+from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving.solving import solve_clicks
 
 _FARTHEST_M = 0.3
@@ -45,7 +45,7 @@ def place_clicks(
     options: CalibrationOptions,
     *,
     confirmed: Sequence[ReflectorClick] = (),
-    reflector_m: float | None = None,
+    reflector_m: float = REFLECTOR_M,
     progress: Callable[[ViewProgress | str], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> PlacedClicks | Unsolvable:
@@ -56,7 +56,7 @@ def place_clicks(
         camera: the intrinsics.
         options: of the calibration.
         confirmed: clicks that a person placed; they stay as they are.
-        reflector_m: width of the reflector [m], if it is known.
+        reflector_m: width of the reflector [m].
         progress: called with what is done next, in words, and while the images are looked at.
         stopped: asked often; once it is true there are no clicks.
 
@@ -78,7 +78,7 @@ def place_clicks(
     views, proposals = found
     if not proposals.ranked and any(click.counts for click in confirmed):
         return PlacedClicks(tuple(confirmed), None)
-    placed = automatic_clicks(proposals, views, camera, options, confirmed=confirmed)
+    placed = automatic_clicks(proposals, views, camera, options)
     if isinstance(placed, Unsolvable):
         return placed
     clicks = _with_own_ids(placed.clicks, confirmed)

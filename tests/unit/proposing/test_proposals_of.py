@@ -24,7 +24,9 @@ from calib_core.proposing import (
     automatic_clicks,
     proposals_of,
 )
-from calib_core.proposing.common_width import CommonWidth, common_width
+from calib_core.proposing.candidate_rays import candidate_rays
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
 from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
 from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_images_of
@@ -183,9 +185,7 @@ def test_an_echo_of_a_marked_reflector_is_not_proposed_and_says_where_it_is_mark
 
 
 def test_a_fairly_sure_proposal_says_when_its_apex_is_not_seen():
-    drawn = draw_views(0, Drawing(count=7))
-    barely = CommonWidth(0.24, 6.77, np.array([-1.0, 1.0, -1.0, 1.0]))
-    found = proposals_of(drawn.views, drawn.camera, OPTIONS, width=barely).ranked
+    found = [one for seed in range(4) for one in proposed(draw_views(seed, Drawing(count=7))).ranked]
     fairly = [one for one in found if 0.8 <= one.confidence < 0.9]
     assert fairly
     assert all("blurred" in one.reason for one in fairly)
@@ -310,28 +310,21 @@ def test_too_few_placements_are_refused():
 
 
 def test_wrong_deals_of_the_radar_score_far_below_the_right_one():
-    right = common_width(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
-    assert right.score > right.by_chance.max() + 5.0
-    assert right.probability > 0.9
+    rays = candidate_rays(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
+    prior = mounting_prior(OPTIONS, is_flat=False)
+    right = pose_agreement(rays, prior)
+    assert right.score > chance_scores(rays, prior).max() + 5.0
 
 
-def test_no_wrong_deal_gives_a_dwell_the_radar_of_one_at_the_same_time():
-    """With all dwells at one time nothing can be dealt: chance is unknown, and nothing is trusted."""
-    drawn = draw_views(4, Drawing(count=8))
-    first = drawn.views[0].placement
-    at_once = [
-        replace(view, placement=replace(view.placement, start=first.start, end=first.end)) for view in drawn.views
-    ]
-    found = common_width(at_once, CAMERA, OPTIONS)
-    assert not len(found.by_chance)
-    assert found.probability < 1e-9
-
-
-def test_the_radar_of_one_recording_with_the_images_of_another_is_no_better_than_its_deals():
-    for seed in range(4):
-        views = with_images_of(draw_views(seed, Drawing(count=10)), draw_views(seed + 20, Drawing(count=10)))
-        assert not common_width(views, CAMERA, OPTIONS).is_probable
-        assert not proposals_of(views, CAMERA, OPTIONS).ranked
+def test_a_person_who_stands_at_every_placement_is_refused_and_not_proposed():
+    """The radar and the images agree on the mounting, but no apex is seen although a reflector's would be."""
+    drawn = draw_views(1, Drawing(count=10, listed_share=1.0))
+    near = tuple(replace(view, width_px=30.0) for view in drawn.views)
+    assert not proposals_of(near, CAMERA, OPTIONS).ranked
+    found = taken(near)
+    assert found.code == "not-confident"
+    assert found.facts["why"] == "no-apex"
+    assert len(proposals_of(near, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked) >= 8
 
 
 def test_apexes_where_the_reflector_is_large_confirm_it():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import TimeNs
-from calib_core.proposing import Proposals, ViewProgress
+from calib_core.proposing import ViewProgress
 from cocalib.session.events import PlacementDismissed
 from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.proposing import ProposingService
@@ -46,7 +46,7 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 def found(monkeypatch: pytest.MonkeyPatch) -> None:
     def find(*_: object, progress: Any, **__: object) -> Any:
         progress(ViewProgress(len(PLACEMENTS), len(PLACEMENTS), DRAWN.views))
-        return DRAWN.views, Proposals(())
+        return DRAWN.views, None
 
     monkeypatch.setattr("cocalib.proposing.find_proposals", find)
 
@@ -106,7 +106,7 @@ def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace
 
 def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeypatch):
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
-    monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, Proposals(())))
+    monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, None))
     time = views[1].image_time
 
     async def visit(desk: ProposingService, told: list[Any]) -> None:
