@@ -154,15 +154,20 @@ def _chance(sigmas: float, freedom: float) -> float:
     return float(chdtrc(3.0, sigmas**2) if np.isinf(freedom) else fdtrc(3.0, freedom, sigmas**2 / 3.0))
 
 
-def _misreading(centre: _Centre, prior: CameraPrior, radar_from_level: Matrix33) -> tuple[str, str]:
+def _misreading(centre: _Centre, prior: CameraPrior, to_radar: Matrix33) -> tuple[str, str]:
     """Return what would not contradict the pairs if it were read in another way, and in which.
 
     Divided by a hundred, any position is at the radar: only a camera that the pairs place away from it tells.
+
+    Args:
+        centre: of the camera, by the pairs alone.
+        prior: the position as it was measured.
+        to_radar: rotation to the radar's axes from those along the ground.
     """
     if centre.sigmas_from(np.zeros(3), prior.sigma_m) <= _OTHER_UNIT_SIGMAS:
         return "", ""
     slips = {(misread, unit): factor * prior.position_m for misread, unit, factor in _UNIT_SLIPS}
-    slips["position", "level"] = radar_from_level @ prior.position_m
+    slips["position", "level"] = to_radar @ prior.position_m
     nearest = min(slips, key=lambda slip: centre.sigmas_from(slips[slip], prior.sigma_m))
     return nearest if centre.sigmas_from(slips[nearest], prior.sigma_m) < _AGREEING_SIGMAS else ("", "")
 
