@@ -11,7 +11,7 @@ from calib_core.words.warnings import SOLVER
 PAGE = Path(__file__).parent / "warnings.md"
 _HEAD = "| code | given when | could also be |\n|---|---|---|\n"
 _CONSEQUENCES = "| consequence | codes |\n|---|---|\n"
-_NAMES = {"limited": "not good"}
+_NAMES = {"limited": "not good", "note": "nothing"}
 
 
 def _explained(row: Row) -> str:

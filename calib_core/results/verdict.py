@@ -362,6 +362,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         _NOT_MIRRORED,
         "nobody-confirmed",
     ),
+    "note": ("angle-scale", "placement-ranges"),
 }
 """The codes of each consequence, the gravest first."""
 _RANKED: dict[str, tuple[int, Consequence]] = {
