@@ -324,7 +324,7 @@ def _warning(fit: SolvedFit, test: Tested, beside: Sequence[Tested]) -> DataWarn
     return DataWarning("shared-error-suspected", facts | others)
 
 
-_MOST_BESIDE = 3  # other causes that are said
+_MOST_BESIDE = 2  # other causes that are said
 
 
 def _step_facts(fit: SolvedFit, test: Tested) -> Facts:

@@ -524,17 +524,17 @@ def intrinsics_suspected(
     if focal_length is not None:
         message = (
             "residuals grow with the distance from the image's centre: the given focal length seems "
-            f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}{_or_else(beside)}"
+            f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}"
         )
     else:
         message = (
             "residuals grow with the cube of the distance from the image's centre: the given lens distortion seems off by "
-            f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click{_or_else(beside)}"
+            f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click"
         )
     return remark(
         message,
-        "check that the intrinsics belong to this camera, lens, zoom and image size, or calibrate the camera again; a radar with "
-        "an azimuth scale error of the same size looks the same",
+        "check that the intrinsics belong to this camera, lens, zoom and image size, or calibrate the camera again"
+        + (_or_else(beside) or "; a radar with an azimuth scale error of the same size looks the same"),
         CalibrateLens(),
     )
 

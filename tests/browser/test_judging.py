@@ -59,9 +59,6 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     assert (done["done"], done["key"], done["word"]) == (True, "E", done["level"])
     assert page.text("#verdict .line") == done["word"] + page.said(done["line"])
     assert page.text("#guide").split()[:3] == ["Done.", "E", "export"]
-    page.page.click("#guide >> text=camera position")
-    expect(page.page.locator("[data-field='solving.camera_position'] .triple input").first).to_be_focused()
-    page.page.click("#sheet-close")
     assert in_sight(page)
 
     page.page.click("#menu-button")
