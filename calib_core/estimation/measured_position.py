@@ -25,6 +25,7 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.geometry import RigidTransform, camera_position_jacobian
+from calib_core.measurements import MIN_PAIRS
 from calib_core.radar import cartesian_from_polar
 
 _SLIP_PROBABILITY = 0.02  # p: of positions measured to another point of the housing, with a wrong sign, in another unit
@@ -175,6 +176,8 @@ def _misreading(centre: _Centre, prior: CameraPrior, to_radar: Matrix33) -> tupl
 def _level(fit: ErrorsInVariablesFit) -> Matrix33:
     """Return the rotation from axes along the plane of the placements, forward as the radar looks, to the radar's."""
     points = cartesian_from_polar(fit.polar[:, fit.inliers].T)
+    if len(points) < MIN_PAIRS:
+        return np.eye(3)
     up = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
     up = up * (1.0 if up[2] >= 0.0 else -1.0)
     left = np.cross(up, (1.0, 0.0, 0.0))

@@ -93,7 +93,7 @@ COMMANDS: Mapping[str, Command] = {
             (
                 "old.yaml --camera camera.yaml --out calibration.json",
                 "robot.urdf --camera camera.yaml --out calibration.json",
-                "T_camera_lidar.txt T_radar_lidar.txt --camera camera.yaml --out calibration.json",
+                "T_camera_lidar.txt T_radar_lidar.txt --camera camera.yaml",
             ),
         ),
         Command(

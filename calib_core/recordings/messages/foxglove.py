@@ -15,7 +15,8 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from calib_core.errors import MessageError
+from calib_core.errors import InputError, MessageError
+from calib_core.parsing import json_form
 from calib_core.recordings.containers.sources import Channel
 
 Whole: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 32)]
@@ -210,10 +211,10 @@ def _read(channel: Channel, payload: bytes) -> _PointCloud | _CompressedImage | 
     form = _SCHEMAS[channel.type.rpartition(".")[2]][1]
     try:
         if channel.encoding == "json":
-            return msgspec.json.decode(payload, type=form)
+            return json_form(payload, form)
         values = _Decoder(_types(channel.definition)).message(payload, channel.type, 0)
         return msgspec.convert(values, type=form, builtin_types=(bytes,))
-    except (msgspec.DecodeError, RecursionError, ValueError, struct.error) as error:
+    except (InputError, msgspec.DecodeError, RecursionError, ValueError, struct.error) as error:
         raise MessageError(
             f"topic {channel.topic}: a {channel.type} message of {len(payload)} bytes does not fit its schema ({error}); it is "
             "damaged, or of another version"
