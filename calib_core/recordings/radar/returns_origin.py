@@ -253,11 +253,9 @@ def _resolution_m(points: Points3) -> float:
 
 def _bins(points: Points3, step_m: float) -> float:
     """Return what bins of range, and of azimuth or its sine, explain [nats]; 0 if those of x and y explain more."""
-    _, first = np.unique(
-        np.round(points / step_m), axis=0, return_index=True
-    )  # a repeated return repeats about any place
-    x, y, _ = points = points[first].T
-    range_m, u, _ = direction_cosines(points.T).T
+    _, first = np.unique(np.round(points / step_m), axis=0, return_index=True)  # repeated ones repeat about any place
+    x, y = points[first, :2].T
+    range_m, u, _ = direction_cosines(points[first]).T
     angles = np.median(range_m) * np.array([np.arctan2(y, x), u])
     polar = _repeats(range_m, step_m) + max(_repeats(values, step_m) for values in angles)
     return polar if polar > _repeats(x, step_m) + _repeats(y, step_m) else 0.0
@@ -278,7 +276,8 @@ def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
     pairs = pairs[:: max(1, len(pairs) // _MOST_PAIRS)]
     apart = (points[pairs[:, 1]] - points[pairs[:, 0]])[:, axes]
     long_m = np.linalg.norm(apart, axis=1)
-    pairs, normals = pairs[long_m > 10.0 * _PLANE_M], (apart / long_m[:, None])[long_m > 10.0 * _PLANE_M]
+    wide = long_m > 10.0 * _PLANE_M
+    pairs, normals = pairs[wide], apart[wide] / long_m[wide, None]
     grid = min(_repeats(points[:, axis], step_m) for axis in (0, 1)) > len(points)  # of both x and y: a nat a return
     if len(pairs) < _FEWEST or len(axes) < 2 or grid or step_m > _PLANE_M:
         return np.zeros(3), 0.0
