@@ -15,11 +15,11 @@ Written by `COMMAND`; do not edit.
 - **The stated 95 % holds.** Where radar, lens, clicks and measured position are wrong as real ones are, the stated region
   contains the truth in about 95 % of the draws: with 12 to 40 pairs, one in ten of them wrong, with and without a measured
   camera position. Where 25, 49 or 81 % of the variance of the radar's angles are smooth over direction (lengths of
-  10 to 40 deg), it does in 96, 91 and 78 % of 80 draws each, and in 98 % of 760 without
+  10 to 40 deg), it does in 97, 96 and 91 % of 160 draws each, and in 99 % of 520 without
   (`python -m benchmarks.accuracy.coverage_guard`).
 - **Measure the camera position.** With a TI radar and 20 pairs it brings the position from about 15 cm to a few, and shows what
   pairs alone cannot. One that is 3 to 11 cm off is covered by the stated error; one that is 30 cm off is named in at least
-  nine of ten draws, and loses its weight in the pose. Of right ones, up to one in 33 is named too.
+  nine of ten draws, and loses its weight in the pose. Of right ones, one in fifty or fewer is called doubtful.
 - **The radar decides the angles:** about half a degree with an imaging radar, about one degree with a TI radar, several with a
   TI radar in a narrow aisle, where the verdict says coarse.
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
