@@ -15,15 +15,17 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.rectification import maps_npz, rectified_camera, rectified_file
-from calib_core.interchange.format import Format, WrittenPose
+from calib_core.interchange.format import Format, PoseFor, WrittenPose
 from calib_core.interchange.formats.registry import format_named, written_formats
-from calib_core.interchange.formats.statement import corrections_lines, missing_map
+from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.formats.static_transform import ChildFrame, second_parent_notes, write_command, write_python
 from calib_core.interchange.formats.urdf import write_joint
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.own.raw_data import OtherPose, for_raw, other_pose
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.interchange.trees.frame_tree import FrameTree
+from calib_core.radar import RadarErrors
 
 _MAPS_NAME = "rectification.npz"
 _SAME_MATRIX_NOTE = (
@@ -60,14 +62,14 @@ class Export:
         content: text, or bytes if the format is binary.
         notes: what a user of the file must know; the missing angle map first.
         extra_files: what belongs beside it.
-        needs_corrections: its pose is for corrected radar data; `for_raw` gives that for data as reported.
+        other_pose: what it could hold instead, for the other kind of radar data; None if there is none, or hardly another.
     """
 
     file_name: str
     content: str | bytes
     notes: tuple[str, ...] = ()
     extra_files: tuple[ExtraFile, ...] = ()
-    needs_corrections: bool = False
+    other_pose: OtherPose | None = None
 
     @property
     def data(self) -> bytes:
@@ -97,7 +99,11 @@ class NotExported:
 
 
 def export_all(
-    file: CalibrationFile, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+    file: CalibrationFile,
+    *,
+    parent_from_radar: RigidTransform | None = None,
+    rectified: bool = False,
+    returns: PoseFor | None = None,
 ) -> tuple[dict[str, Export], tuple[NotExported, ...]]:
     """Export a calibration to every format that can represent it.
 
@@ -105,6 +111,7 @@ def export_all(
         file: what to export.
         parent_from_radar: as for `export`; used by the formats that have a third frame.
         rectified: as for `export`; used by the formats that cannot store distortion.
+        returns: as for `export`; used by the formats that cannot store the corrections.
 
     Returns:
         The files by the name of their format, and the formats that cannot represent it.
@@ -114,7 +121,13 @@ def export_all(
     for known in written_formats():
         parent = parent_from_radar if known.write_in_parent else None
         try:
-            made = export(file, known.name, parent_from_radar=parent, rectified=rectified and known.is_for_rectified)
+            made = export(
+                file,
+                known.name,
+                parent_from_radar=parent,
+                rectified=rectified and known.is_for_rectified,
+                returns=returns if known.pose_for else None,
+            )
         except InputError as error:
             refused.append(NotExported(known.name, str(error)))
             continue
@@ -134,6 +147,7 @@ def export(
     parent_from_radar: RigidTransform | None = None,
     rectified: bool = False,
     frames: FrameNames | None = None,
+    returns: PoseFor | None = None,
 ) -> Export:
     """Export a calibration to another format; the same calibration gives the same bytes.
 
@@ -144,15 +158,12 @@ def export(
         rectified: the file is for images undistorted with this same camera matrix, no distortion left. Without it, "kitti"
             and "nuscenes", which cannot store distortion, get the camera matrix of images rectified with maps of ours.
         frames: the frame names to write; None for the calibration's own.
+        returns: "raw" writes the pose for radar data as reported, "corrected" the calibration's own; None what the format is for.
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
-    if file.corrected is not None and chosen.holds_corrections:
-        raise InputError(
-            f"the format {name} holds what the radar gets wrong, so its pose is never one for raw data; omit --for"
-        )
     if frames is not None and frames != file.frames:
         file = replace(file, frames=frames, made_from_sha256=calibration_sha256(file))
     if chosen.write is None:
@@ -160,7 +171,8 @@ def export(
             f"the format {name} can only be read; cocalib export --to list shows those that can be written"
         )
     _refuse_rectified(chosen, rectified=rectified)
-    prepared = _prepared(file, chosen, rectified=rectified)
+    meant, kept = posed(file, chosen, returns)
+    prepared = _prepared(meant, chosen, rectified=rectified)
     if parent_from_radar is None:
         content = chosen.write(prepared.file)
     elif chosen.write_in_parent is None:
@@ -168,12 +180,32 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(prepared.file, parent_from_radar)
-    uncorrected = () if chosen.holds_corrections else corrections_lines(file)
-    lost = () if chosen.holds_corrections else missing_map(file.calibration)
-    notes_on = chosen.notes_on(file) if chosen.notes_on else ()
-    notes = (*lost, *uncorrected, *chosen.notes, *notes_on, *prepared.notes)
-    needs = bool(uncorrected) and file.corrected is None
-    return Export(chosen.file_name, content, notes, prepared.extra_files, needs)
+    other = other_pose(meant) if chosen.pose_for else None
+    choice = () if other is None else (other.note,)
+    lost = missing_map(meant.calibration) if chosen.pose_for else ()
+    notes_on = chosen.notes_on(meant) if chosen.notes_on else ()
+    notes = (*lost, *choice, *kept, *chosen.notes, *notes_on, *prepared.notes)
+    return Export(chosen.file_name, content, notes, prepared.extra_files, other)
+
+
+def posed(file: CalibrationFile, chosen: Format, returns: PoseFor | None) -> tuple[CalibrationFile, tuple[str, ...]]:
+    """Return the calibration with the pose that a format is to hold, and why it keeps its own if that is for data as reported.
+
+    Raises:
+        InputError: the format stores the corrections, or the pairs determine no such pose.
+    """
+    if chosen.pose_for is None and returns is not None:
+        raise InputError(f"the format {chosen.name} stores the radar's corrections, or no pose; omit --for")
+    if (returns or chosen.pose_for) != "raw":
+        return file, ()
+    if file.calibration.radar_errors == RadarErrors() and file.corrected is None:
+        return file, ("no corrections are known: the pose serves for returns as reported",)
+    try:
+        return for_raw(file), ()
+    except InputError as error:
+        if returns is not None:
+            raise
+        return file, (f"the pose is for corrected returns: {error}",)
 
 
 _JOINING: Mapping[str, Callable[[CalibrationFile, ChildFrame], str]] = {
@@ -183,7 +215,7 @@ _JOINING: Mapping[str, Callable[[CalibrationFile, ChildFrame], str]] = {
 }
 
 
-def attached_export(file: CalibrationFile, name: str, tree: FrameTree) -> Export:
+def attached_export(file: CalibrationFile, name: str, tree: FrameTree, *, returns: PoseFor | None = None) -> Export:
     """Export a calibration for use beside a frame tree.
 
     If the camera's frame has a parent there, the transform leads from the radar to the root of its chain, such as the
@@ -193,6 +225,7 @@ def attached_export(file: CalibrationFile, name: str, tree: FrameTree) -> Export
         file: what to export.
         name: of a format that publishes or describes frames.
         tree: of the robot, its driver or a recording.
+        returns: as for `export`.
 
     Raises:
         InputError: the format has no frames, or radar and camera are already connected in the tree.
@@ -201,7 +234,8 @@ def attached_export(file: CalibrationFile, name: str, tree: FrameTree) -> Export
         raise InputError(
             f"--tree is for formats that add a joint to a frame tree ({', '.join(_JOINING)}), not {name}; omit it"
         )
-    plain = export(file, name)
+    plain = export(file, name, returns=returns)
+    file, _ = posed(file, format_named(name), returns)
     radar, camera = file.frames.radar, file.frames.camera
     if camera not in tree.frames:
         near = f"the tree has no frame {camera}, so it becomes a new one; if it has another name there, give --camera-frame"
@@ -221,7 +255,7 @@ def attached_export(file: CalibrationFile, name: str, tree: FrameTree) -> Export
         f"{root}, and the chain below it stays its driver's"
     )
     notes = tuple(one for one in plain.notes if one not in second_parent_notes(file))
-    return Export(plain.file_name, content, (*notes, note))
+    return replace(plain, content=content, notes=(*notes, note))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from calib_core.interchange.check.agreement import AgreementLimits
 from calib_core.interchange.check.pair_residuals import read_check_pairs_file
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
-from calib_core.interchange.format import ImportedCalibration, imported
+from calib_core.interchange.format import ImportedCalibration, PoseFor, imported
 from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_files
 from calib_core.interchange.pair_tables import read_pair_table
@@ -121,7 +121,12 @@ def write_calibration(
 
 
 def export(
-    calibration: Calibration | CalibrationFile, name: str, *, frames: FrameNames | None = None, rectified: bool = False
+    calibration: Calibration | CalibrationFile,
+    name: str,
+    *,
+    frames: FrameNames | None = None,
+    rectified: bool = False,
+    returns: PoseFor | None = None,
 ) -> Export:
     """Export a calibration to the format of another tool.
 
@@ -130,6 +135,7 @@ def export(
         name: of the format, such as "tf2", "urdf", "kalibr", "opencv" or "kitti".
         frames: names of the two frames, for a result; None uses "radar" and "camera_optical".
         rectified: the images are undistorted with this same camera matrix; see the notes of "kitti" and "nuscenes".
+        returns: "raw" writes the pose for radar data as reported, "corrected" the calibration's own; None what the format is for.
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
@@ -137,7 +143,7 @@ def export(
     file = (
         calibration_json.calibration_file(calibration, frames) if isinstance(calibration, Calibration) else calibration
     )
-    return export_file(file, name, rectified=rectified)
+    return export_file(file, name, rectified=rectified, returns=returns)
 
 
 def check(

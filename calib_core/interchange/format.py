@@ -23,6 +23,8 @@ Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
 Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]
 AngleUnit = Literal["rad", "deg"]
+PoseFor = Literal["raw", "corrected"]
+"""Whether a pose is for radar data as reported, or after taking out what the radar gets wrong."""
 
 TRUTH_FORMAT = "truth"
 """The ground truth of a simulation: for comparison, never a calibration."""
@@ -248,7 +250,8 @@ class Format:
         used_in: where its files are used: the heading in lists.
         also: other words that someone may search for.
         notes_on: returns more notes, which depend on the calibration; None if there are none.
-        holds_corrections: it stores what the radar gets wrong: its errors and its angle map.
+        pose_for: the radar data that its pose is for, unless the user says: "raw" if the file serves to project returns,
+            "corrected" if it states a mounting. None if it stores what the radar gets wrong, too, or no pose.
     """
 
     name: str
@@ -264,7 +267,7 @@ class Format:
     used_in: str = "Other tools"
     also: str = ""
     notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
-    holds_corrections: bool = False
+    pose_for: PoseFor | None = "corrected"
 
     @property
     def is_for_rectified(self) -> bool:

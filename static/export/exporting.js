@@ -9,7 +9,7 @@ import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { on, said, state } from "../base/state.js";
-import { despiteBox, frameDrawing, IDENTITY, nameFields, parentFields, rawBox, rectifiedBox } from "./fields.js";
+import { despiteBox, frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox, returnsChoice } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 
 /** @typedef {import("./list.js").Format} Format */
@@ -40,7 +40,7 @@ let asked = 0;
 const head = make("div", "what", []);
 const names = nameFields(() => load());
 const rectified = rectifiedBox(() => load());
-const raw = rawBox(() => load());
+const returns = returnsChoice(() => load());
 const despite = despiteBox(() => load());
 /** @type {ReturnType<typeof parentFields>} */
 let parent;
@@ -141,10 +141,11 @@ function build() {
   });
   const list = formatColumn((key) => {
     keep({ format: key });
+    returns.chosen = "";
     load();
   });
   const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, raw.row, despite.row, parent.element, before, text, notes]), side, foot);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, returns.row, rectified.row, despite.row, parent.element, before, text, notes]), side, foot);
 }
 
 /** The formats, and the clicks and the report as two of them. */
@@ -187,7 +188,7 @@ function address(kind) {
   const query = new URLSearchParams();
   if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
   if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
-  if (!raw.row.hidden && raw.box.checked) query.set("raw", "1");
+  if (returns.chosen) query.set("returns", returns.chosen);
   if (!despite.row.hidden && despite.box.checked) query.set("despite_verdict", "1");
   for (const [name, value] of names.typed) query.set(name, value);
   return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
@@ -205,7 +206,8 @@ function drawPreview(preview) {
   const kind = preview.is_binary ? `binary, ${size(preview.size_bytes)}; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   names.draw(preview);
-  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified, raw: preview.offers_raw, despite: preview.asks_despite_verdict });
+  returns.draw(preview.other_pose);
+  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified, returns: preview.other_pose !== null, despite: preview.asks_despite_verdict });
   before.replaceChildren(...beforeSaving(preview));
   show(preview.text, preview.file_name, preview.is_binary);
   if (!despite.row.hidden && !despite.box.checked) for (const control of [copy, save]) control.disabled = true;
@@ -249,12 +251,12 @@ function drawReason(reason, canRetry = false, field = null) {
   for (const control of [fileName, copy, save]) control.disabled = true;
 }
 
-/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, raw?: boolean, despite?: boolean}} shown */
+/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, returns?: boolean, despite?: boolean}} shown */
 function drawFields(shown) {
   names.element.hidden = !shown.names;
   parent.element.hidden = !shown.parent;
   rectified.row.hidden = !shown.rectified;
-  raw.row.hidden = !shown.raw;
+  returns.row.hidden = !shown.returns;
   despite.row.hidden = !shown.despite;
   for (const fields of [names, parent]) fields.refuse("");
 }

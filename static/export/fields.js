@@ -123,14 +123,31 @@ export function rectifiedBox(changed) {
   return { box, row: make("div", "rectified", [label]) };
 }
 
-/** The user's wish for a pose that fits radar data as reported, for software that does not correct them. @param {() => void} changed */
-export function rawBox(changed) {
-  const box = make("input", "", []);
-  box.type = "checkbox";
-  box.addEventListener("change", changed);
-  const label = make("label", "", [box, "For radar data as reported: my software does not correct them"]);
-  label.dataset.hint = "Solved again without radar corrections, for software that cannot correct radar biases (--for raw).";
-  return { box, row: make("div", "rectified raw", [label]) };
+const RETURNS = { raw: "returns as the radar reports them", corrected: "corrected" };
+
+/** Which radar data the pose is for; `chosen` is "" until the user says, and then what the format is used for decides. @param {() => void} changed */
+export function returnsChoice(changed) {
+  const choice = { chosen: "", row: make("fieldset", "rectified returns", []), draw };
+  const gain = make("span", "gain", "");
+  const buttons = Object.entries(RETURNS).map(([key, words]) => {
+    const button = make("input", "", []);
+    Object.assign(button, { type: "radio", name: "returns", value: key });
+    button.addEventListener("change", () => {
+      choice.chosen = key;
+      changed();
+    });
+    choice.row.append(make("label", "", [button, words]));
+    return button;
+  });
+  choice.row.prepend(make("legend", "", "Pose for"));
+  choice.row.append(gain);
+  /** @param {{is_for: "raw"|"corrected", gain: string}|null} other the pose that the file could hold instead */
+  function draw(other) {
+    if (!other) return;
+    for (const button of buttons) button.checked = button.value !== other.is_for;
+    gain.textContent = `${RETURNS[other.is_for]}: ${other.gain}`;
+  }
+  return choice;
 }
 
 /** What is asked before a contradictory calibration is saved; asked again for each. @param {() => void} changed */

@@ -20,7 +20,7 @@ from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
-RECTIFIED = f"{DIALOG} .rectified:not(.raw):not(.despite) input"
+RECTIFIED = f"{DIALOG} .rectified:not(.returns):not(.despite) input"
 
 
 @pytest.fixture(scope="module")

@@ -47,8 +47,8 @@ class Export:
 
     rectified: Switch = False
     """Your images are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
-    for_: Annotated[Literal["raw"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
-    """raw: the pose for radar data as reported, for software that cannot correct radar biases."""
+    for_: Annotated[Literal["raw", "corrected"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
+    """Pose for radar data as reported (raw), or corrected; without it, raw in formats that serve to project returns."""
     despite_verdict: Switch = False
     """Write a calibration that is contradictory, too; the file says so where it can."""
     trees: Trees = field(default_factory=TreeFlags)
@@ -74,12 +74,12 @@ class Export:
         if self._is_refused(file):
             return IN_DOUBT
         if self.trees.into:
-            code = self.trees.patch(file, self.frames, to=self.to, out=self.out)
+            code = self.trees.patch(file, self.frames, to=self.to, out=self.out, returns=self.for_)
             _print_warnings(file)
             return code
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
         if self.to == "all":
-            return _write_all(self.frames.renamed(file), self.out, parent_from_radar=parent, rectified=self.rectified)
+            return self._write_all(self.frames.renamed(file), parent)
         return self._write_one(file, parent)
 
     def _print_list(self) -> int:
@@ -95,7 +95,9 @@ class Export:
 
     def _write_one(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
         renamed = self.frames.renamed(file)
-        written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
+        written = self.trees.export(
+            renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified, returns=self.for_
+        )
         if self.out is not None:
             told = _write_files(self.out, written)
         elif isinstance(written.content, bytes):
@@ -112,13 +114,36 @@ class Export:
             print_exactly(str(written.content))
         return 0
 
+    def _write_all(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
+        """Write every format that can hold the calibration into a folder, and print why the others cannot."""
+        from calib_core.interchange.exporting import export_all
+
+        folder = self.out
+        if folder is None or (folder.exists() and not folder.is_dir()):
+            raise InputError("--to all needs a folder: --out FOLDER")
+        written, refused = export_all(
+            file, parent_from_radar=parent_from_radar, rectified=self.rectified, returns=self.for_
+        )
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be made: {error.strerror or error}") from error
+        extra = {folder / each.file_name: each.data for made in written.values() for each in made.extra_files}
+        write_all({folder / made.file_name: made.data for made in written.values()} | extra)
+        for name, made in written.items():
+            print(f"{name}: written to {folder / made.file_name}")
+        for exported in refused:
+            print(f"{exported.name}: not written: {exported.reason}")
+        _print_warnings(file)
+        for note in dict.fromkeys(note for made in written.values() for note in made.notes):
+            names = ", ".join(name for name, made in written.items() if note in made.notes)
+            print(f"note: {names}: {note}", file=sys.stderr)
+        return 0
+
     def _calibration(self) -> "CalibrationFile":
         if len(self.calibration) != 1:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
-        from calib_core.interchange.own.raw_data import for_raw
-
-        file = _own_calibration(self.calibration[0])
-        return file if self.for_ is None else for_raw(file)
+        return _own_calibration(self.calibration[0])
 
     def _is_refused(self, file: "CalibrationFile") -> bool:
         """Say that a contradictory calibration is not written, unless the user wants it."""
@@ -139,7 +164,7 @@ class Export:
                 f"export into a recording: cocalib export CALIBRATION.json --to {MCAP} --recording RECORDING... --out NEW.mcap"
             )
         if self.for_ is not None:
-            raise InputError(f"--for raw does not apply to --to {MCAP}: it writes the corrections, too")
+            raise InputError(f"--for does not apply to --to {MCAP}: it writes the corrections, too")
         file = _own_calibration(self.calibration[0])
         if self._is_refused(file):
             return IN_DOUBT
@@ -154,34 +179,6 @@ def _write_files(out: Path, written: "Written") -> list[str]:
     files = {target: written.data} | {target.parent / extra.file_name: extra.data for extra in written.extra_files}
     write_all(files)
     return [f"written to {path}" for path in files]
-
-
-def _write_all(
-    file: "CalibrationFile", folder: Path | None, *, parent_from_radar: "RigidTransform | None", rectified: bool
-) -> int:
-    """Write every format that can hold the calibration into a folder, and print why the others cannot."""
-    from calib_core.interchange.exporting import export_all
-
-    if folder is None or (folder.exists() and not folder.is_dir()):
-        raise InputError("--to all needs a folder: --out FOLDER")
-    written, refused = export_all(file, parent_from_radar=parent_from_radar, rectified=rectified)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror or error}") from error
-    extra = {folder / each.file_name: each.data for made in written.values() for each in made.extra_files}
-    write_all({folder / made.file_name: made.data for made in written.values()} | extra)
-    for name, made in written.items():
-        print(f"{name}: written to {folder / made.file_name}")
-    for exported in refused:
-        print(f"{exported.name}: not written: {exported.reason}")
-    _print_warnings(file)
-    for note in dict.fromkeys(note for made in written.values() for note in made.notes):
-        names = ", ".join(name for name, made in written.items() if note in made.notes)
-        print(f"note: {names}: {note}", file=sys.stderr)
-    if corrected := [name for name, made in written.items() if made.needs_corrections]:
-        print(f"note: {', '.join(corrected)}: --for raw writes the pose for radar data as reported", file=sys.stderr)
-    return 0
 
 
 def _print_warnings(file: "CalibrationFile") -> None:

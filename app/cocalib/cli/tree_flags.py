@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform
     from calib_core.interchange.calibration_file import CalibrationFile
     from calib_core.interchange.exporting import Export
-    from calib_core.interchange.format import ImportedCalibration
+    from calib_core.interchange.format import ImportedCalibration, PoseFor
     from calib_core.interchange.trees.frame_choice import WantedFrames
     from calib_core.interchange.trees.frame_tree import FrameTree
     from calib_core.interchange.trees.reading import TreeFile
@@ -109,19 +109,22 @@ class TreeFlags:
     tree: Annotated[tuple[Path, ...], called("FILE...")] = ()
     """Frames that exist already, such as the camera driver's: a URDF, a recording, what ros2 topic echo /tf_static printed."""
 
-    def patch(self, file: "CalibrationFile", frames: FrameFlags, *, to: str, out: File) -> int:
+    def patch(
+        self, file: "CalibrationFile", frames: FrameFlags, *, to: str, out: File, returns: "PoseFor | None"
+    ) -> int:
         """Print what changes in the files of --into, or write it; return the exit code.
 
         Raises:
             InputError: the joint cannot be chosen or changed, or options contradict each other.
         """
+        from calib_core.interchange.own.raw_data import for_raw
         from calib_core.interchange.trees.patching import patched
 
         if to != "list":
             raise InputError("--into changes an existing file, --to writes a new one; give one of them")
         files = _kept_files(self.into)
         known = _tree_of(self.tree).joints if self.tree else ()
-        change = patched(files, known, file, frames.wanted, joint=self.joint)
+        change = patched(files, known, for_raw(file) if returns == "raw" else file, frames.wanted, joint=self.joint)
         for line in (f"solved for {change.why}", *(f"note: {note}" for note in change.notes)):
             print(line, file=sys.stderr)
         if out is not None:
@@ -137,7 +140,13 @@ class TreeFlags:
         return 0
 
     def export(
-        self, file: "CalibrationFile", to: str, *, parent_from_radar: "RigidTransform | None", rectified: bool
+        self,
+        file: "CalibrationFile",
+        to: str,
+        *,
+        parent_from_radar: "RigidTransform | None",
+        rectified: bool,
+        returns: "PoseFor | None",
     ) -> "Export":
         """Export a calibration to a format, beside the frames of --tree if there are any.
 
@@ -149,8 +158,8 @@ class TreeFlags:
         if self.joint is not None or self.write:
             raise InputError("--joint and --write are for --into FILE; give that too")
         if self.tree:
-            return attached_export(file, to, _tree_of(self.tree))
-        return export(file, to, parent_from_radar=parent_from_radar, rectified=rectified)
+            return attached_export(file, to, _tree_of(self.tree), returns=returns)
+        return export(file, to, parent_from_radar=parent_from_radar, rectified=rectified, returns=returns)
 
 
 Trees: TypeAlias = Annotated[TreeFlags, tyro.conf.arg(name="")]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast, get_args
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -13,7 +13,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.exporting import parent_pose
-from calib_core.interchange.format import Format, ImportedCalibration, WrittenPose
+from calib_core.interchange.format import Format, ImportedCalibration, PoseFor, WrittenPose
 from calib_core.interchange.formats.registry import written_formats
 from calib_core.measurements import TimeNs
 
@@ -240,7 +240,7 @@ def _pair_at(file: CalibrationFile) -> str | None:
     return pairs[nearest].id if apart_m[nearest] < _SAME_M else None
 
 
-Field = Literal["frames", "parent", "rectified", "raw", "despite_verdict"]
+Field = Literal["frames", "parent", "rectified", "returns", "despite_verdict"]
 """A part of the panel that the user fills in."""
 
 _RADAR_FRAME, _CAMERA_FRAME, _PARENT = "radar_frame", "camera_frame", "parent_from_radar"
@@ -266,14 +266,14 @@ class Fields:
         frames: the names to write.
         parent_from_radar: the radar's pose in a third frame; None for the radar as origin.
         rectified: the images are rectified.
-        raw: the pose is to fit radar data as reported.
+        returns: the radar data that the pose is to be for; None for what the format is used for.
         despite_verdict: a contradictory calibration is to be written, too.
     """
 
     frames: FrameNames
     parent_from_radar: RigidTransform | None
     rectified: bool
-    raw: bool
+    returns: PoseFor | None
     despite_verdict: bool
 
 
@@ -281,12 +281,12 @@ def fields_in(query: str, usual: FrameNames) -> Fields:
     """Return the fields in the query of a URL.
 
     Args:
-        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw`, `rectified=1`, `raw=1` and
-            `despite_verdict=1`, each optional.
+        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw`, `rectified=1`,
+            `returns=raw` or `corrected`, and `despite_verdict=1`, each optional.
         usual: the calibration's frame names, for what the query does not name.
 
     Raises:
-        FieldError: a name cannot be a frame's, a pose is none, or one of the others is neither 0 nor 1.
+        FieldError: a name cannot be a frame's, a pose is none, or another field has no such value.
     """
     given = {key: values[-1] for key, values in parse_qs(query, keep_blank_values=True).items()}
     try:
@@ -297,7 +297,7 @@ def fields_in(query: str, usual: FrameNames) -> Fields:
         frames,
         _parent_in(given.get(_PARENT, "")),
         _yes_or_no("rectified", given),
-        _yes_or_no("raw", given),
+        _returns_in(given.get("returns")),
         _yes_or_no("despite_verdict", given),
     )
 
@@ -315,7 +315,13 @@ def _parent_in(text: str) -> RigidTransform | None:
         raise FieldError("parent", str(error)) from None
 
 
-def _yes_or_no(field: Literal["rectified", "raw", "despite_verdict"], given: Mapping[str, str]) -> bool:
+def _returns_in(text: str | None) -> PoseFor | None:
+    if text not in (None, *get_args(PoseFor)):
+        raise FieldError("returns", f"returns: {text!r} is neither raw nor corrected")
+    return cast(PoseFor | None, text)
+
+
+def _yes_or_no(field: Literal["rectified", "despite_verdict"], given: Mapping[str, str]) -> bool:
     text = given.get(field, "0")
     if text not in ("0", "1"):
         raise FieldError(field, f"{field}: {text!r} is neither 0 nor 1; 1 means yes")

@@ -29,6 +29,7 @@ CAMERA_INFO = Format(
     numbers=_NUMBERS,
     file_name="camera_info.yaml",
     camera="lens",
+    pose_for=None,
     comment="#",
     notes=_NOTES,
     write=_write,

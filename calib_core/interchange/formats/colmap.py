@@ -97,6 +97,7 @@ COLMAP = Format(
     numbers="world (radar) into camera, quaternion w x y z; principal point half a pixel larger",
     file_name="colmap.zip",
     camera="lens",
+    pose_for="raw",
     comment="#",
     notes=_NOTES,
     write=_write,

@@ -177,6 +177,7 @@ KITTI = Format(
     numbers="Tr_velo_to_cam carries radar points into the camera; images undistorted",
     file_name="calib.txt",
     camera="matrix",
+    pose_for="raw",
     comment="numbers",
     notes=_NOTES,
     write=_write,

@@ -95,6 +95,7 @@ MATLAB = Format(
     numbers="camera_from_radar.A carries radar points into the camera; camera.PrincipalPoint counts from 1",
     file_name="radar_camera.mat",
     camera="lens",
+    pose_for="raw",
     comment="keys",
     notes=_NOTES,
     write=_write,

@@ -130,6 +130,7 @@ OPENCV = Format(
     numbers="R, T, rvec carry radar points into the camera",
     file_name="radar_camera.yml",
     camera="lens",
+    pose_for="raw",
     comment="#",
     write=_write,
     reads=Reads(_recognizes, _read),

@@ -116,6 +116,7 @@ PJLAB = Format(
     numbers=_NUMBERS,
     file_name="radar-to-camera-extrinsic.json",
     camera="none",
+    pose_for="raw",
     comment="keys",
     notes=(POSE_ONLY,),
     write=_write,

@@ -1,7 +1,7 @@
 """What every file states, in comments or in keys: both frames, the equation, the order, the check point, the origin.
 
-The origin is what an exported file says of the calibration that it was made from: evidence, hash, figures, warnings, and what
-it cannot hold.
+The origin is what an exported file says of the calibration that it was made from: evidence, hash, figures, verdict, and what it
+cannot hold. At most six lines.
 """
 
 import re
@@ -49,8 +49,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
     frames = file.frames
     lines = [
         f"{EQUATION} with radar frame {quoted(frames.radar)} (x forward, y left, z up), "
-        f"camera frame {quoted(frames.camera)} (optical: x right, y down, z forward), metres",
-        meaning,
+        f"camera frame {quoted(frames.camera)} (optical: x right, y down, z forward), metres; {meaning}",
     ]
     check = file.check_point
     if check is not None:
@@ -59,15 +58,10 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
             f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
             f" -> pixel [{numbers_text(check.pixel_px)}] px{_OF_RECTIFIED if rectified else ''}"
         )
-    errors = file.calibration.radar_errors
-    if errors != RadarErrors():
-        lines.append(
-            "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md "
-            "(Files and formats under Help): "
-            + ", ".join(f"{entry.name} {getattr(errors, entry.name):.6g}" for entry in fields(errors))
-        )
-    lines += corrections_lines(file)
-    lines += _origin_lines(file)
+    origin = f"evidence: {file.rests_on}; from the calibration with sha256 {calibration_sha256(file)}"
+    returns = (*_for_which_returns(file), *missing_map(file.calibration))
+    parts = ((origin, *_figures(file.calibration)), returns, _verdict(file))
+    lines += ["; ".join(each) for each in parts if each]
     # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())
     lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")
@@ -146,22 +140,6 @@ class Origin:
     for_raw: bool = False
 
 
-def _origin_lines(file: CalibrationFile) -> tuple[str, ...]:
-    """Return what every exported file says about its calibration, one line each; `stated_origin` reads the first."""
-    calibration = file.calibration
-    lines = [
-        f"evidence: {file.rests_on}; from the calibration with sha256 {calibration_sha256(file)}",
-        _figures(calibration),
-    ]
-    if file.verdict is not None:
-        lines.append(f"verdict: {file.verdict.level}, {_one_line(file.verdict.reason)}")
-        lines += [f"assuming: {_one_line(file.verdict.assumes)}"] if file.verdict.assumes else []
-    if calibration.warnings:
-        codes = dict.fromkeys(_one_line(warning.code) for warning in calibration.warnings)
-        lines.append(f"warnings of the calibration, explained in calibration.json: {', '.join(codes)}")
-    return (*(line for line in lines if line), *missing_map(calibration))
-
-
 def missing_map(calibration: Calibration) -> tuple[str, ...]:
     """Return the line about the angle map that only calibration-1 holds; nothing if there is no map."""
     grid = calibration.angle_map
@@ -173,18 +151,21 @@ def missing_map(calibration: Calibration) -> tuple[str, ...]:
     )
 
 
-def corrections_lines(file: CalibrationFile) -> tuple[str, ...]:
-    """Return the line about the AED with and without the radar's corrections; nothing if there are none, or both are alike."""
-    found = aed_either_way(file)
-    if found is None:
+def _for_which_returns(file: CalibrationFile) -> tuple[str, ...]:
+    """Return which radar data the pose is for, with the AED either way; nothing if the radar has no corrections."""
+    either = aed_either_way(file)
+    if file.corrected is not None:
+        means = f"AED {either[0]:.3g} px; with the corrections {either[1]:.3g} px" if either else ""
+        return (f"{_FOR_RAW}: the pose was solved without taking out what the radar gets wrong, {means}",)
+    errors = file.calibration.radar_errors
+    if errors == RadarErrors():
         return ()
-    if file.corrected is None:
-        meant, without = (f"{aed_px:.3g}" for aed_px in found)
-        return (f"without the corrections AED {without} instead of {meant} px",) if without != meant else ()
-    return (
-        f"{_FOR_RAW}: the pose was solved without taking out what the radar gets wrong, AED {found[0]:.3g} px; "
-        f"with the corrections {found[1]:.3g} px",
+    values = ", ".join(f"{entry.name} {getattr(errors, entry.name):.6g}" for entry in fields(errors))
+    first = (
+        "for corrected radar data: p_radar is a true position; first take the radar's errors out of a reported one, as in "
+        f"docs/formats.md (Files and formats under Help): {values}"
     )
+    return (first, f"without the corrections AED {either[1]:.3g} instead of {either[0]:.3g} px") if either else (first,)
 
 
 def stated_origin(text: str) -> Origin:
@@ -193,7 +174,7 @@ def stated_origin(text: str) -> Origin:
     return Origin(stated_evidence(match[1]), match[2], f"{_FOR_RAW}: " in text) if match else Origin()
 
 
-def _figures(calibration: Calibration) -> str:
+def _figures(calibration: Calibration) -> tuple[str, ...]:
     metrics, parts = calibration.metrics, []
     if np.isfinite(metrics.aed_px):
         held_out = f", held-out {metrics.held_out_aed_px:.3g} px" if np.isfinite(metrics.held_out_aed_px) else ""
@@ -203,7 +184,14 @@ def _figures(calibration: Calibration) -> str:
         sigma = np.sqrt(variances)
         cm, deg = (", ".join(f"{value:.2g}" for value in part) for part in (sigma[:3] * 100, np.degrees(sigma[3:])))
         parts.append(f"sigma of camera_from_radar in camera axes: x, y, z {cm} cm; rotX, rotY, rotZ {deg} deg")
-    return "; ".join(parts)
+    return tuple(parts)
+
+
+def _verdict(file: CalibrationFile) -> tuple[str, ...]:
+    if file.verdict is None:
+        return ()
+    assuming = (f"assuming: {_one_line(file.verdict.assumes)}",) if file.verdict.assumes else ()
+    return (f"verdict: {file.verdict.level}, {_one_line(file.verdict.reason)}", *assuming)
 
 
 def _one_line(text: str) -> str:

@@ -72,6 +72,7 @@ MATRIX = Format(
     numbers="rows of the 4x4 matrix that carries radar points into the camera",
     file_name="camera_from_radar.txt",
     camera="none",
+    pose_for="raw",
     comment="#",
     notes=(POSE_ONLY,),
     write=_write,

@@ -286,7 +286,7 @@ CALIBRATION_1 = Format(
     comment="keys",
     write=write_calibration,
     reads=Reads(_recognizes, _read),
-    holds_corrections=True,
+    pose_for=None,
 )
 """calibration-1 as a format of the registry."""
 

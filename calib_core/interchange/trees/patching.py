@@ -14,6 +14,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Form
 from calib_core.interchange.formats.statement import missing_map
+from calib_core.interchange.own.raw_data import other_pose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
 from calib_core.interchange.trees.frame_choice import (
@@ -96,6 +97,7 @@ def patched(
     free = free_joint(tree, chosen, [file.source for file in files], joint)
     target, notes = _target(tree, chosen, calibration)
     parent_from_child = _solved(tree, chosen, free.joint, target)
+    other = other_pose(calibration)
     file = next(file for file in files if file.source == free.joint.place.source)
     after = _with_numbers(file, free.joint, parent_from_child)
     again = joined_tree([TreeFile(after.encode(), one.source) if one is file else one for one in files], recorded)
@@ -106,7 +108,7 @@ def patched(
         after,
         (codecs.BOM_UTF8 if file.data.startswith(codecs.BOM_UTF8) else b"") + after.encode(),
         free.why,
-        (*chosen.notes, *notes, *missing_map(calibration.calibration)),
+        (*chosen.notes, *notes, *missing_map(calibration.calibration), *([] if other is None else [other.note])),
     )
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -29,6 +30,7 @@ from calib_core.interchange.check.report import check
 from calib_core.interchange.exporting import contents_text, export
 from calib_core.interchange.format import imported
 from calib_core.interchange.formats.registry import FORMATS
+from calib_core.interchange.formats.statement import statement
 from calib_core.interchange.importing import adopt, read_any
 from calib_core.interchange.own.calibration_json import (
     calibration_file,
@@ -37,7 +39,7 @@ from calib_core.interchange.own.calibration_json import (
     write_calibration,
 )
 from calib_core.interchange.own.pairs_files import read_pairs
-from calib_core.interchange.own.raw_data import aed_either_way, for_raw
+from calib_core.interchange.own.raw_data import aed_either_way, for_raw, other_pose
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
@@ -268,7 +270,7 @@ def test_every_export_with_comments_states_the_errors_and_reads_back(solved):
     for form in FORMATS:
         if form.comment not in ("#", "<!-- -->") or form.name == "colmap":
             continue
-        text = export(file, form.name, rectified=form.is_for_rectified).data.decode()
+        text = export(file, form.name, returns="corrected" if form.pose_for else None).data.decode()
         assert f"azimuth_scale {solved.radar_errors.azimuth_scale:.6g}" in text, form.name
         if form.reads is not None:
             assert check(read_any(text), camera=solved.camera).ok, form.name
@@ -401,28 +403,32 @@ def scaled() -> CalibrationFile:
     return calibration_file(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
 
 
-CORRECTED = [known for known in FORMATS if not known.holds_corrections and known.reads and known.write]
+POSED = [known for known in FORMATS if known.pose_for and known.reads and known.write]
 
 
-@pytest.mark.parametrize("known", CORRECTED, ids=[known.name for known in CORRECTED])
-def test_an_export_states_the_aed_with_and_without_what_it_cannot_hold(scaled, known):
-    right, other = aed_either_way(scaled)
+@pytest.mark.parametrize("known", POSED, ids=[known.name for known in POSED])
+def test_an_export_says_what_the_pose_for_the_other_radar_data_would_change(scaled, known):
+    right, without = aed_either_way(scaled)
     written = export(scaled, known.name, rectified=known.is_for_rectified)
+    other = written.other_pose
 
-    assert other > 1.5 * right
-    assert any(f"AED {other:.3g} instead of {right:.3g} px" in note for note in written.notes)
-    assert written.needs_corrections
-    assert f"{other:.3g} instead of {right:.3g} px" in contents_text(written) or f"{right} {other}" in contents_text(
-        written
-    )
-    assert not read_any(written.data).for_raw
+    assert without > 1.5 * right
+    assert other.is_for == ("corrected" if known.pose_for == "raw" else "raw")
+    assert f"--for {other.is_for}" in other.note
+    assert other.note in written.notes
+    assert other.moved_cm > 1
+    assert other.aed_px[1] < other.aed_px[0]
+    assert read_any(written.data).for_raw == (known.pose_for == "raw")
+    again = export(scaled, known.name, rectified=known.is_for_rectified, returns=other.is_for)
+    assert again.other_pose.is_for == known.pose_for
+    assert read_any(again.data).for_raw == (other.is_for == "raw")
 
 
-@pytest.mark.parametrize("known", CORRECTED, ids=[known.name for known in CORRECTED])
+@pytest.mark.parametrize("known", POSED, ids=[known.name for known in POSED])
 def test_a_pose_for_raw_data_says_so_in_its_file_and_check_knows_it(scaled, known):
     raw = for_raw(scaled)
     with_errors, without = aed_either_way(scaled), aed_either_way(raw)
-    found = read_any(export(raw, known.name, rectified=known.is_for_rectified).data)
+    found = read_any(export(scaled, known.name, rectified=known.is_for_rectified, returns="raw").data)
 
     assert without[0] < with_errors[1]
     assert without[1] == with_errors[0]
@@ -432,15 +438,46 @@ def test_a_pose_for_raw_data_says_so_in_its_file_and_check_knows_it(scaled, know
     assert report.verdict == "right", str(report)
     assert {"same-pose", "agrees", "pairs-fit"} <= {one.code for one in report.results}
     assert "data as reported" in str(report)
-    plain = read_any(export(scaled, known.name, rectified=known.is_for_rectified).data)
+    plain = read_any(export(scaled, known.name, rectified=known.is_for_rectified, returns="corrected").data)
     assert np.linalg.norm(plain.pose.translation_m - found.pose.translation_m) > 0.02
 
 
-def test_a_format_that_holds_the_corrections_has_no_pose_without_them(scaled):
-    raw = for_raw(scaled)
+@pytest.mark.parametrize("known", POSED, ids=[known.name for known in POSED])
+def test_the_comment_of_an_export_has_at_most_six_lines(scaled, known):
+    content = contents_text(export(scaled, known.name, rectified=known.is_for_rectified))
 
-    with pytest.raises(InputError, match="omit --for"):
-        export(raw, "json")
-    assert not np.isfinite(raw.calibration.covariance).any()
+    assert len(statement(scaled, known.numbers)) <= 6
+    if known.comment == "#" and not known.file_name.endswith(".zip"):
+        assert len(re.findall(r"^# ", content, re.MULTILINE)) <= 6
+
+
+def test_the_covariance_of_a_raw_pose_grows_by_what_no_pose_replaces_over_the_field(scaled):
+    raw = for_raw(scaled).calibration
+    grown = raw.covariance - scaled.calibration.covariance
+    assert np.linalg.eigvalsh(grown).min() > -1e-12
+    assert np.trace(grown) > 0
+
+    reported = np.array([pair.point_radar_m for pair in raw.pairs if pair.inlier])
+    left_px = raw.reproject(reported) - scaled.calibration.reproject(reported)
+    squared = np.einsum("ni,nij,nj->n", left_px, np.linalg.inv(raw.pixel_covariance(reported)), left_px)
+    assert 0.5 < squared.mean() < 2.0  # degrees of freedom
+
+
+def test_a_calibration_without_corrections_or_pairs_is_exported_as_it_is(scaled):
+    bare = replace(scaled, calibration=replace(scaled.calibration, pairs=()))
+    exact = replace(scaled, calibration=replace(scaled.calibration, radar_errors=RadarErrors()))
+
+    for file in (bare, exact):
+        written = export(file, "opencv")
+        assert len(written.notes) > len(export(file, "opencv", returns="corrected").notes)
+        assert not read_any(written.data).for_raw
+    assert export(exact, "opencv", returns="raw").content == export(exact, "opencv").content
     with pytest.raises(InputError, match="solved from the pairs"):
-        for_raw(replace(scaled, calibration=replace(scaled.calibration, pairs=())))
+        export(bare, "opencv", returns="raw")
+    with pytest.raises(InputError, match="omit --for"):
+        export(scaled, "json", returns="raw")
+
+
+def test_poses_that_hardly_differ_are_no_choice(scaled):
+    wide = replace(scaled.calibration, covariance=scaled.calibration.covariance * 1e6)
+    assert other_pose(replace(scaled, calibration=wide)) is None

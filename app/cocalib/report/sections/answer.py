@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.own.raw_data import aed_either_way
+from calib_core.interchange.own.raw_data import aed_either_way, other_pose
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from calib_core.words.verdict import stated_verdict
@@ -224,6 +224,8 @@ def _figures(calibration: Calibration) -> Markup:
     if differ := either is not None and plain(either[0]) != plain(either[1]):
         rows.insert(1, ("mean reprojection error (AED) without the corrections", f"{plain(either[1])} px"))
     note = "Corrections: radar biases, which only calibration-1 can hold."
+    if other := other_pose(CalibrationFile(calibration)):
+        note += f" Files that serve to project returns as reported hold another pose: {other.gain}."
     return tag("div", heading, _table(("figure", "value"), rows), tag("p", note, class_="note") if differ else None)
 
 

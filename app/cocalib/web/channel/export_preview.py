@@ -7,12 +7,11 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, Evidence
 from calib_core.interchange.check.report import CheckReport, check
-from calib_core.interchange.exporting import Export, contents_text, export
-from calib_core.interchange.format import imported
+from calib_core.interchange.exporting import Export, contents_text, export, posed
+from calib_core.interchange.format import PoseFor, imported
 from calib_core.interchange.formats.registry import format_named
 from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.importing import read_any
-from calib_core.interchange.own.raw_data import for_raw
 from cocalib.view.model import WarningRow, warning_row
 from cocalib.view.wording import sentence
 from cocalib.web.exports import (
@@ -34,6 +33,19 @@ _EVIDENCE: dict[Evidence, str] = {
     "imported_assumed": "Imported; what its numbers mean was assumed, nothing proves it",
     "automatic": "Rests on automatic, unconfirmed clicks",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class PoseChoice:
+    """The pose for the other kind of radar data.
+
+    Attributes:
+        is_for: the radar data that it is for: "raw" as reported, or "corrected".
+        gain: what it would change.
+    """
+
+    is_for: PoseFor
+    gain: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +72,7 @@ class ExportPreview:
         evidence: what the pose rests on.
         missing: what the calibration has and this file cannot hold; "" if nothing.
         warnings: of the calibration.
-        offers_raw: the pose is for corrected radar data, and one for data as reported can be written.
+        other_pose: what the file could hold instead, for the other kind of radar data; None if nothing else.
         asks_despite_verdict: the calibration is contradictory: whoever saves it says so.
     """
 
@@ -83,7 +95,7 @@ class ExportPreview:
     evidence: str
     missing: str
     warnings: tuple[WarningRow, ...]
-    offers_raw: bool
+    other_pose: PoseChoice | None
     asks_despite_verdict: bool
 
 
@@ -112,7 +124,7 @@ def exported(file: CalibrationFile, key: str, query: str) -> Export:
         raise FieldError(
             "despite_verdict", "the calibration is contradictory; tick that it is to be written nevertheless"
         )
-    return _exported(_meant(file, key, fields), key, fields)
+    return _exported(file, key, fields)
 
 
 def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
@@ -129,13 +141,14 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         InputError: the format cannot hold this calibration, or has no third frame.
     """
     fields = fields_in(query, file.frames)
-    file = _meant(file, key, fields)
     written, form = _exported(file, key, fields), format_named(key)
+    file, _ = posed(file, form, fields.returns if form.pose_for else None)
     named = replace(file, frames=fields.frames)
     whole = imported(named)
     report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
     saved = written.download
-    lost = () if form.holds_corrections else missing_map(file.calibration)
+    lost, other = missing_map(file.calibration) if form.pose_for else (), written.other_pose
+    told = (*lost, other.note) if other else lost
     return ExportPreview(
         key=key,
         file_name=f"{_slug(recording_name)}_{saved.file_name}",
@@ -143,7 +156,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         is_binary=isinstance(written.content, bytes) or bool(written.extra_files),
         size_bytes=len(saved.data),
         numbers=sentence(form.numbers),
-        notes=tuple(sentence(note) for note in written.notes if note not in lost),
+        notes=tuple(sentence(note) for note in written.notes if note not in told),
         is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
         pose=pose_in_file(report.imported, fields.frames) if form.reads else None,
         our_pose=our_numbers(file.calibration.camera_from_radar),
@@ -156,7 +169,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         evidence=_evidence(file),
         missing=" ".join(map(sentence, lost)),
         warnings=tuple(map(warning_row, file.calibration.warnings)),
-        offers_raw=file.corrected is not None or written.needs_corrections,
+        other_pose=PoseChoice(other.is_for, other.gain) if other else None,
         asks_despite_verdict=_asks_despite_verdict(file, key),
     )
 
@@ -164,11 +177,6 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
 def _asks_despite_verdict(file: CalibrationFile, key: str) -> bool:
     """Return whether to ask before saving: not for our own format, whose readers know the verdict."""
     return file.is_contradictory and key != "json"
-
-
-def _meant(file: CalibrationFile, key: str, fields: Fields) -> CalibrationFile:
-    """Return the calibration for radar data as reported, if it is asked for and the format holds no corrections."""
-    return for_raw(file) if fields.raw and not format_named(key).holds_corrections else file
 
 
 def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
@@ -180,6 +188,7 @@ def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
             parent_from_radar=fields.parent_from_radar,
             rectified=fields.rectified,
             frames=fields.frames,
+            returns=fields.returns if form.pose_for else None,
         )
     except InputError as error:
         if form.is_for_rectified and file.calibration.camera.is_distorted and not fields.rectified:

@@ -7,7 +7,7 @@ import posixpath
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Protocol
 
@@ -322,6 +322,7 @@ def _formats(_query: str) -> Reply:
     return _reply(msgspec.json.encode(format_rows()), _TYPES[".json"])
 
 
+@lru_cache(maxsize=2)
 def _file_of(text: str) -> CalibrationFile:
     return read_calibration(text, "the calibration")
 

@@ -11,7 +11,6 @@ from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 from calib_core.interchange.own.calibration_json import calibration_file
-from calib_core.interchange.own.raw_data import for_raw
 from calib_core.radar import AngleMap
 from calib_core.words.verdict import StatedVerdict
 from cocalib.web.channel import export_preview as panel
@@ -70,13 +69,17 @@ def test_a_file_with_others_that_belong_to_it_is_saved_as_one_zip(file):
     assert preview.size_bytes == len(written.data)
 
 
-def test_a_pose_for_radar_data_as_reported_is_offered_and_written_where_corrections_are_lost():
+def test_which_radar_data_the_pose_is_for_can_be_chosen_where_corrections_are_lost():
     errors = SystematicErrors(azimuth_scale=0.04, range_bias_m=0.05)
     drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
     off = calibration_file(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
-    plain, raw = (panel.export_preview(off, "tf2", query, "drive") for query in ("", "raw=1"))
-    assert (plain.offers_raw, raw.offers_raw) == (True, True)
-    assert raw.text == panel.exported(for_raw(off), "tf2", "").content
+    plain, raw = (panel.export_preview(off, "tf2", query, "drive") for query in ("", "returns=raw"))
+    assert (plain.other_pose.is_for, raw.other_pose.is_for) == ("raw", "corrected")
+    assert not any("--for" in note for note in (*plain.notes, *raw.notes))
+    assert raw.text == panel.exported(off, "tf2", "returns=raw").content
     assert plain.text != raw.text
     assert raw.check_is_good
-    assert not panel.export_preview(off, "json", "raw=1", "drive").offers_raw
+    assert panel.export_preview(off, "opencv", "", "drive").other_pose.is_for == "corrected"
+    assert panel.export_preview(off, "json", "returns=raw", "drive").other_pose is None
+    with pytest.raises(FieldError):
+        panel.export_preview(off, "tf2", "returns=both", "drive")
