@@ -37,6 +37,8 @@ _LEAST_SCORE = 0.5  # times that of a good placement of this recording
 _GOOD_SHARE = 0.75  # of the placements score less than a good one
 _MOST_OF_ECHO = 0.9  # of its time the first echo of a second one is there
 _LEAST_COMMON = 0.25  # of the returns of two dwells that are alternatives
+_LISTED_LAST = 0.25  # share of a dwell's returns that are listed first, below which another alternative is
+_MOST_SCANS = 0.75  # of those that show the best alternative: one of two scan types shows half
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +58,7 @@ class Dwell:
         ends: the same after its end.
         keys: (k,) numbers of those returns that have alternatives, which these share; ascending.
         listed_first: share of its returns that the radar lists first among their alternatives.
+        first_listed_radar_m: (3,) median of those that are listed first in their place.
     """
 
     start: TimeNs
@@ -70,6 +73,7 @@ class Dwell:
     ends: bool
     keys: Indices
     listed_first: float
+    first_listed_radar_m: Vector3
 
     def is_alternative_of(self, other: "Dwell") -> bool:
         """Return whether both are the same returns, at positions of which at most one is true."""
@@ -166,11 +170,20 @@ def _at_once(dwells: Sequence[Dwell], kept: Sequence[Dwell], typical_db: float) 
 
 
 def _likeliest(dwell: Dwell, dwells: Sequence[Dwell]) -> Dwell:
-    """Return the alternative of a dwell that the radar lists first in most scans; most dwells have none."""
+    """Return a dwell at the alternative that most scans show, else at the one that the radar lists first; most have none.
+
+    A radar that measures in two ways, one scan after the other, has other alternatives in each: only the true one is in both.
+    The one that is listed first may be no dwell, where clutter hides it at other times.
+    """
     if not len(dwell.keys):
         return dwell
-    alternatives = [other for other in dwells if _overlap_s(dwell, other) > 0.0 and dwell.is_alternative_of(other)]
-    return max([dwell, *alternatives], key=lambda one: (round(one.listed_first), one.weight))
+    others = [other for other in dwells if _overlap_s(dwell, other) > 0.0 and dwell.is_alternative_of(other)]
+    most = max(one.presence for one in (dwell, *others))
+    shown = [one for one in (dwell, *others) if one.presence > _MOST_SCANS * most]
+    likeliest = max(shown, key=lambda one: (round(one.listed_first), one.weight))
+    if len(shown) <= len(others) or likeliest.listed_first >= _LISTED_LAST:
+        return likeliest
+    return replace(likeliest, position_radar_m=likeliest.first_listed_radar_m)
 
 
 def _heaviest_first(dwells: Sequence[Dwell]) -> list[Dwell]:
@@ -428,21 +441,24 @@ def _without_hands(grid: _Grid, members: Indices, span: tuple[int, int]) -> tupl
 def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwell | None:
     """Measure the presence inside and outside a dwell's span; None if the dwell is clutter or chance."""
     span = _without_hands(grid, members, span)
-    shown = np.unique(grid.scan[members])
-    inside = (shown >= span[0]) & (shown <= span[1])
-    presence = float(inside.sum()) / (span[1] - span[0] + 1)
+    mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
+    snr_db = grid.snr_db[mine]
+    known = snr_db[np.isfinite(snr_db)]
+    mean_db = float(known.mean()) if len(known) else float("nan")
+    presence = float(len(np.unique(grid.scan[mine]))) / (span[1] - span[0] + 1)
     start_s, end_s = grid.times_s[span[0]], grid.times_s[span[1]]
     others = _outside(grid.times_s, start_s, end_s)
+    strong_db = float(np.quantile(known, _STRONG_QUANTILE)) if len(known) else float("nan")
+    as_strong = members[~(grid.snr_db[members] < strong_db - _WEAKER_DB)]
+    shown = np.unique(grid.scan[as_strong])
     presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
     stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
     if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
         return None
-    mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
     position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
-    snr_db = grid.snr_db[mine]
-    known = snr_db[np.isfinite(snr_db)]
-    mean_db = float(known.mean()) if len(known) else float("nan")
     range_m = float(np.linalg.norm(position_radar_m))
+    keys = np.unique(grid.key[mine][grid.key[mine] >= 0])
+    first_listed = grid.listed_first & np.isin(grid.key, keys)
     return Dwell(
         start=TimeNs(int(grid.times_ns[span[0]])),
         end=TimeNs(int(grid.times_ns[span[1]])),
@@ -454,8 +470,9 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         reach=grid.reach,
         begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
         ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
-        keys=np.unique(grid.key[mine][grid.key[mine] >= 0]),
+        keys=keys,
         listed_first=float(grid.listed_first[mine].mean()),
+        first_listed_radar_m=np.median(grid.points_radar_m[first_listed], axis=0) if len(keys) else position_radar_m,
     )
 
 
@@ -466,6 +483,9 @@ def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:
 def _any_within(times_s: Values, first_s: float, last_s: float) -> bool:
     return bool(np.searchsorted(times_s, first_s) < np.searchsorted(times_s, last_s))
 
+
+_STRONG_QUANTILE = 0.75
+"""Of a dwell's echoes: what is much weaker than these at other times is not the same thing, and hides nothing."""
 
 _OUTSHONE_DB = 6.0
 

@@ -161,6 +161,40 @@ def test_without_snr_only_one_placement_stands_at_a_time():
     assert all(one.end <= other.start + NS_PER_S for one, other in pairwise(found))
 
 
+def scans_of_two_types(
+    alternatives: dict[int, tuple[tuple[float, float, float], ...]], *, start_s: float = 20.0, end_s: float = 28.0
+) -> RadarScans:
+    """Build scans of which every second lists a return at the first places, the others at the second; 60 s, 10 a second."""
+    scans = []
+    for number, time_s in enumerate(np.arange(0.0, 60.0, 0.1).tolist()):
+        places = np.array(alternatives[number % 2]) if start_s <= time_s <= end_s else np.zeros((0, 3))
+        scans.append(scan_of(time_s, places, snr_db=20.0, alternative_of=np.zeros(len(places), dtype=np.int64)))
+    return RadarScans.from_scans(scans)
+
+
+def test_of_several_azimuths_the_one_in_both_types_of_scan_is_the_true_one():
+    wrong, other = (6.0, -2.0, 0.0), (5.0, 3.5, 0.0)
+    scans = scans_of_two_types({0: (wrong, REFLECTOR), 1: (REFLECTOR, other)})
+    (placement,) = find_placements(scans, GatingOptions())
+    assert placement.position_radar_m == pytest.approx(REFLECTOR)
+
+
+def test_the_azimuth_listed_first_is_taken_where_clutter_hides_it_at_other_times():
+    second = (6.0, -2.0, -0.8)
+    shown = scans_of_two_types({0: (REFLECTOR, second), 1: (REFLECTOR, second)})
+    clutter = scans_with([(0.0, 19.0, REFLECTOR, 20.0), (29.0, 60.0, REFLECTOR, 20.0)])
+    pairs = [(shown.scan(i), clutter.scan(i)) for i in range(len(shown))]
+    scans = RadarScans.from_scans([one if len(one.points_radar_m) else other for one, other in pairs])
+    (placement,) = find_placements(scans, GatingOptions())
+    assert placement.position_radar_m == pytest.approx(REFLECTOR, abs=0.02)
+
+
+@pytest.mark.parametrize(("clutter_db", "seen"), [(8.0, True), (18.0, False)])
+def test_what_is_much_weaker_at_other_times_hides_no_placement(clutter_db, seen):
+    placements = found_in((10.0, 20.0, REFLECTOR, 24.0), (42.0, 60.0, REFLECTOR, clutter_db))
+    assert any(one.end < 25 * NS_PER_S for one in placements) == seen
+
+
 def test_a_radar_that_scatters_widely_shows_its_placements_too():
     fine = scans_with([(5.0 + 12.0 * i, 13.0 + 12.0 * i, (6.0 + i, 1.0 - i, -0.8), 25.0) for i in range(4)])
     rng = np.random.default_rng(3)
