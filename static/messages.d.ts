@@ -228,10 +228,11 @@ export interface VerdictRow {
   word: string;
   kind: string;
   pairs: string[];
-  key: "" | "N" | "E" | "J";
+  key: "" | "N" | "E";
   option: string;
   done: boolean;
   early: boolean;
+  misfits: Words;
 }
 
 /** Everything a client draws about the session. */

@@ -22,6 +22,7 @@ from calib_core.results.actions import (
     FollowHint,
     PlaceReflector,
     ReduceError,
+    ReviewPairs,
     SetOption,
     Stop,
 )
@@ -134,6 +135,8 @@ _NOT_MIRRORED = "handedness-assumed"
 _FEW = "few-pairs"
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _BY_DEFAULT = SetOption("method", "default")
+_MOST_CHECKED = 3
+"""Of the clicks with the largest residuals so many are named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,13 +275,15 @@ def _verdict_of_pose(
     """Judge a pose by its stated error, and by its gravest warning."""
     consequence: Consequence = "note" if warning is None else consequence_of(warning.code)
     count = sum(pair.inlier for pair in calibration.pairs)
+    few_pairs = count if count < SURE_PAIRS else 0
     if warning is not None and consequence == "coarse":
         more = left and warning.code in _MORE_PAIRS_HELP
-        return Verdict("coarse", ClickMore(left) if more else FollowHint(), error=error, cause=warning)
-    if count < SURE_PAIRS:
+        by: Action = ClickMore(left) if more else FollowHint()
+        return Verdict("coarse", by, error=error, cause=warning, pairs=few_pairs)
+    if few_pairs:
         few = next((one for one in calibration.warnings if one.code == _FEW), None)
         action = _most_helpful(calibration, left) if few is None or left else FollowHint()
-        return Verdict("coarse", action, error=error, cause=few, pairs=count)
+        return Verdict("coarse", action, error=error, cause=few, pairs=few_pairs)
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
         return Verdict("coarse", _most_helpful(calibration, left), error=error)
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px
@@ -297,22 +302,45 @@ def _when_good(calibration: Calibration, left: int | None) -> Action:
 
 
 def _most_helpful(calibration: Calibration, left: int | None) -> Action:
-    """Return what reduces the uncertainty most: a placement, or what is known of an error that all pairs share.
+    """Return what reduces the uncertainty most: a placement, better clicks, or what is known of an error that all pairs share.
 
     A calibration read from a file knows no placement: it says nothing of further ones.
 
-    Knowing an error with a share s of a variance leaves 1 - s of it, so it gains 1 / sqrt(1 - s).
+    Knowing an error with a share s of a variance leaves 1 - s of it, so it gains 1 / sqrt(1 - s). Clicks are to be checked if the
+    scatter of the pairs has the largest share, and is larger than what the assumed noise explains.
     """
     best, dominant = calibration.next_placement, calibration.dominant_errors()
     if left and (best is None or not best.may_stop):
         return ClickMore(left)
     share = max((max(one.position_share, one.rotation_share) for one in dominant), default=0.0)
-    if dominant and (best is None or best.may_stop or best.gain * np.sqrt(max(1.0 - share, 1e-9)) < 1.0):
+    scatter, metrics = _scatter_share(calibration), calibration.metrics
+    if scatter > share and metrics.chi2 > metrics.degrees_of_freedom:
+        return ReviewPairs(_largest_residuals(calibration))
+    gains_more = best is not None and best.gain * np.sqrt(max(1.0 - share, 1e-9)) < 1.0
+    if dominant and (best is None or best.may_stop or gains_more):
         return ReduceError(dominant[0].largest.name, calibration.options.solving.camera_position is not None)
     if best is not None and not best.may_stop:
         forward_m, left_m, up_m = best.position_radar_m.tolist()
         return PlaceReflector((forward_m, left_m, up_m), best.gain)
     return Stop() if best is not None else Export()
+
+
+def _scatter_share(calibration: Calibration) -> float:
+    """Return the part of the variance that comes from the scatter of the pairs, of position or rotation; 0 if it is unknown."""
+    parts = calibration.covariance_parts
+    if parts is None:
+        return 0.0
+    stated, others = np.diag(calibration.covariance), np.diag(parts.systematic + parts.camera_position)
+    return max(1.0 - float(others[part].sum() / stated[part].sum()) for part in (slice(0, 3), slice(3, 6)))
+
+
+def _largest_residuals(calibration: Calibration) -> tuple[str, ...]:
+    """Return the pairs with the largest residuals for their noise, the largest first."""
+    pairs = [pair for pair in calibration.pairs if pair.inlier and np.isfinite(pair.expected_covariance_px2).all()]
+    squared = {
+        pair.id: pair.residual_px @ np.linalg.solve(pair.expected_covariance_px2, pair.residual_px) for pair in pairs
+    }
+    return tuple(sorted(squared, key=lambda one: -float(squared[one]))[:_MOST_CHECKED])
 
 
 Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]

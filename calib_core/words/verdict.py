@@ -103,11 +103,12 @@ def reason(verdict: Verdict) -> Words:
     if verdict.error is None:
         spread = f"the method states no error of its pose; its residuals are {verdict.rms_px:.3g} px (RMS)"
         return join((spread, cause or ""), "; ")
+    if verdict.pairs:  # so few pairs do not show how large the error is
+        return cause or words(f"{verdict.pairs} of {SURE_PAIRS} pairs")
     error = error_text(verdict.error)
     if verdict.level in ("good", "usable"):
         return words(error)
-    few = f"{verdict.pairs} of {SURE_PAIRS} pairs" if verdict.pairs and cause is None else ""
-    return join((cause or few, f"within {error}"), "; ")
+    return join((cause or "", f"within {error}"), "; ")
 
 
 def cause_remark(verdict: Verdict) -> Remark:

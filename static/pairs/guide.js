@@ -1,4 +1,7 @@
-/** The line on the frame: the one thing to do now, with its keys, which are buttons; by finger only their words are shown. */
+/**
+ * The line on the frame: the one thing to do now, with its keys, which are buttons; by finger only their words are shown. It is
+ * the first of `RULES` that holds.
+ */
 
 import { act, actionNamed } from "../base/actions.js";
 import { make } from "../base/notices.js";
@@ -13,7 +16,15 @@ const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
 /** @typedef {import("../proposals/words.js").Key} Key */
 /** @typedef {import("../proposals/words.js").Words} Words */
-/** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
+/**
+ * What the rules ask.
+ * @typedef {object} Now
+ * @property {import("../messages.js").ClickRow|undefined} click Of this frame.
+ * @property {import("../base/state.js").Placement|undefined} placement Of this frame.
+ * @property {import("../base/state.js").Placement[]} open Those that want a click.
+ * @property {import("../messages.js").VerdictRow} verdict
+ */
+/** @typedef {{name: string, when: (now: Now) => unknown, say: (now: Now) => Words, act?: boolean}} Rule `act`: something is to be done in this frame */
 
 export function startGuide() {
   on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "layers", "proposals", "connection"], drawGuide);
@@ -31,24 +42,30 @@ function keyPart({ key, label, action, pair, frame, option }) {
 
 function drawGuide() {
   if (state.looking) return; // image/birdseye.js says what is there
-  const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
-  guide.hidden = !words;
-  if (!words) return;
-  guide.classList.toggle("act", words.act);
-  if (guide.dataset.said === JSON.stringify(words.text)) return; // said once
-  guide.dataset.said = JSON.stringify(words.text);
-  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
+  const now = state.shown && state.view && !state.playing ? seen(state.shown.index, state.view) : null;
+  const rule = now && RULES.find(({ when }) => when(now));
+  const words = rule ? rule.say(now) : state.shown ? [] : opening();
+  guide.hidden = !words.length;
+  if (!words.length) return;
+  guide.classList.toggle("act", Boolean(rule?.act));
+  guide.dataset.rule = rule?.name ?? "opening";
+  if (guide.dataset.said === JSON.stringify(words)) return; // said once
+  guide.dataset.said = JSON.stringify(words);
+  guide.replaceChildren(...words.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
 }
 
-/** What to show before there is a frame. @returns {Advice|null} */
+/** What to show before there is a frame. @returns {Words} */
 function opening() {
   const now = state.opening;
-  return now && !now.problem && state.preview ? { text: ["Preview: you can click once the recording is open"], act: false } : null;
+  return now && !now.problem && state.preview ? ["Preview: you can click once the recording is open"] : [];
 }
+
+/** @param {number} index @param {import("../messages.js").View} view @returns {Now} */
+const seen = (index, { verdict }) => ({ click: clickIn(index), placement: placementAt(index), open: state.placements.filter(isOffered), verdict });
 
 const EXCLUDE = { key: "X", label: "exclude it", action: "exclude" };
 const REMOVE = { key: "Del", label: "delete it", action: "delete" };
-const SHOW = { key: "J", label: "show it", action: "worst" };
+const SHOW = { key: "J", label: "show", action: "worst" };
 const POSITION = { key: "", label: "enter the camera position", option: "solving.camera_position" };
 const LENS = { key: "", label: "open Lens", action: "lens" };
 const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
@@ -56,74 +73,86 @@ const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
 const BEYOND = ["No radar return within the maximum range.", RANGE];
 const NEXT = { key: "N", label: "next placement", action: "next-placement" };
 
-/** @param {number} index @returns {Advice|null} */
-function advice(index) {
-  if (state.rectified) return { text: ["Straight edges must be straight: drag a line along one.", { key: "U", label: "image as taken", action: "rectify" }], act: false };
-  const placement = placementAt(index);
-  const here = clickIn(index);
-  if (state.cross) return atCross(state.cross);
-  const offer = proposalWords();
-  if (offer) return { text: offer, act: true };
-  const found = saidWords();
-  if (found && !(placement && isOffered(placement))) return { text: [found], act: false };
-  if (here) return afterClick(here);
-  if (placement && isDismissed(placement)) return { text: ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT], act: false };
-  if (placement && isOffered(placement)) {
-    const number = state.placements.indexOf(placement) + 1;
-    const several = placementsAt(index).length > 1 ? `, one of ${placementsAt(index).length} now` : "";
-    const why = found || silentWords(number - 1);
-    return { text: [`${placementWords(number - 1)}${several}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT], act: true };
-  }
-  const next = nextAction();
-  return next ? { text: next, act: false } : null;
+/** @type {Rule[]} */
+const RULES = [
+  { name: "rectified", when: () => state.rectified, say: () => ["Straight edges must be straight: drag a line along one.", { key: "U", label: "image as taken", action: "rectify" }] },
+  { name: "cross", when: () => state.cross, say: crossWords, act: true },
+  { name: "proposal", when: proposalWords, say: () => proposalWords() ?? [], act: true },
+  { name: "told", when: ({ placement }) => saidWords() && !(placement && isOffered(placement)), say: () => [saidWords()] },
+  { name: "return", when: ({ click }) => returnAsked(click), say: ({ click }) => [returnAsked(click), { key: "C", label: "take the other", action: "next-candidate" }], act: true },
+  { name: "guess", when: ({ click }) => click?.state === "untouched", say: () => ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true },
+  { name: "beyond", when: ({ click, verdict }) => click?.state === "unpaired" && verdict.option === RANGE.option, say: () => BEYOND, act: true },
+  { name: "unpaired", when: ({ click }) => click?.state === "unpaired", say: () => ["No radar position here: click another frame of this placement.", NEXT], act: true },
+  { name: "set-aside", when: ({ click }) => click?.state === "outlier" && !click.disagrees, say: ({ click }) => [click?.note ?? ""], act: true }, // the method or an option does it
+  { name: "misfit", when: ({ click }) => click?.state === "outlier", say: misfitWords, act: true },
+  { name: "dismissed", when: ({ click, placement }) => !click && placement && isDismissed(placement), say: () => ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT] },
+  { name: "placement", when: ({ click, placement }) => !click && placement && isOffered(placement), say: placementHere, act: true },
+  { name: "guesses", when: ({ open }) => !open.length && guesses(), say: () => guessWords() },
+  { name: "done", when: ({ verdict }) => verdict.done, say: doneWords },
+  { name: "out-of-range", when: ({ verdict }) => verdict.option === RANGE.option, say: () => BEYOND },
+  { name: "misfits", when: ({ verdict }) => misfits(verdict), say: ({ verdict, open }) => [misfits(verdict), SHOW, ...onward(open)] },
+  { name: "coming", when: ({ verdict, open }) => verdict.key === "N" && clicks().length && !open.length, say: () => [] }, // the last one is on its way
+  { name: "one-more", when: ({ verdict }) => verdict.key === "N" && verdict.kind === "FollowHint", say: ({ verdict }) => [said(verdict.action), NEXT] },
+  { name: "next", when: ({ verdict }) => verdict.key === "N", say: () => [{ ...NEXT, label: proposalAdvice() }] },
+  { name: "pair", when: ({ verdict }) => pairOf(verdict), say: ({ verdict, open }) => [said(verdict.action), ...pairOf(verdict), ...onward(open)] },
+  { name: "edge", when: ({ verdict, open }) => verdict.kind === "SpreadPlacements" && open.length, say: edgeWords },
+  { name: "verdict", when: () => clicks().length, say: ({ verdict, open }) => [said(verdict.action), ...does(verdict), ...onward(open)] },
+  { name: "searching", when: () => !state.placementsKnown, say: () => ["Looking for placements. You can click meanwhile."] },
+  { name: "first", when: () => state.placements.length, say: ({ verdict }) => [said(verdict.action)] },
+  { name: "none", when: () => true, say: ({ verdict }) => [`${state.placementSummary}. ${said(verdict.action)}`] },
+];
+
+/** @param {import("../base/state.js").Placement[]} open @returns {Words} */
+const onward = (open) => (open.length ? [NEXT] : []);
+
+/** @returns {Words} */
+function crossWords() {
+  const { touched, expected } = /** @type {import("../base/state.js").Cross} */ (state.cross);
+  const last = touched ? "set the mark" : expected ? "leave a guess, which does not count" : "set the mark, once moved";
+  return [...(touched || !expected ? [] : ["The radar expects it here."]), { key: "1–9", label: "zoom" }, { key: "arrows", label: "move" }, { key: "Enter", label: last, action: "place-mark" }];
 }
 
-/** @param {import("../base/state.js").Cross} cross @returns {Advice} */
-function atCross(cross) {
-  const begin = cross.touched || !cross.expected ? [] : ["The radar expects it here."];
-  const last = cross.touched ? "set the mark" : cross.expected ? "leave a guess, which does not count" : "set the mark, once moved";
-  return { text: [...begin, { key: "1–9", label: "zoom" }, { key: "arrows", label: "move" }, { key: "Enter", label: last, action: "place-mark" }], act: true };
+/** What is asked about the return of a click; "" if nothing is. @param {import("../messages.js").ClickRow} [click] */
+const returnAsked = (click) => (click && state.candidates?.click === click.id ? state.candidates.suggestion : "");
+
+/** What may be wrong with a pair that disagrees: the mark, or the return. @param {Now} now @returns {Words} */
+function misfitWords({ click }) {
+  const { id, frame } = /** @type {import("../messages.js").ClickRow} */ (click);
+  const carried = state.placements.length > 0 && !placementsAt(frame).length ? " Was the reflector being carried?" : "";
+  const others = state.candidates?.click === id && state.candidates.rows.length > 1;
+  return [`#${nameOf(id)} does not fit the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
 }
 
-/** What is wrong with the pair of this frame, or else what to do next. @param {import("../messages.js").ClickRow} click @returns {Advice|null} */
-function afterClick(click) {
-  const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
-  if (better) return { text: [better, { key: "C", label: "take the other", action: "next-candidate" }], act: true };
-  if (click.state === "untouched") return { text: ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true };
-  if (click.state === "unpaired") return { text: state.view?.verdict.option === RANGE.option ? BEYOND : ["No radar position here: click another frame of this placement.", NEXT], act: true };
-  if (click.state === "outlier") return { text: outlierWords(click), act: true };
-  const next = nextAction();
-  return next ? { text: next, act: false } : null;
+/** @returns {Words} */
+function placementHere() {
+  const here = placementsAt(state.shown?.index ?? 0);
+  const number = state.placements.indexOf(here.find(isOffered) ?? here[0]);
+  const why = saidWords() || silentWords(number);
+  return [`${placementWords(number)}${here.length > 1 ? `, one of ${here.length} now` : ""}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT];
 }
 
-/** What may be wrong with a pair that disagrees: the mark, or the return. @param {import("../messages.js").ClickRow} click @returns {Words} */
-function outlierWords(click) {
-  if (!click.disagrees) return [click.note]; // the method or an option sets the pair aside: the note says which
-  const carried = state.placements.length > 0 && !placementsAt(click.frame).length ? " Was the reflector being carried?" : "";
-  const others = state.candidates?.click === click.id && state.candidates.rows.length > 1;
-  return [`#${nameOf(click.id)} disagrees with the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
+const guesses = () => clicks().filter((click) => click.state === "untouched").length;
+
+/** @returns {Words} */
+const guessWords = () => [guesses() > 1 ? `${guesses()} marks are guesses and do not count: move each to the inner corner` : "1 mark is a guess and does not count: move it to the inner corner"];
+
+/** The pairs that are set aside; "" without any, or if the answer itself is in question. @param {import("../messages.js").VerdictRow} verdict */
+const misfits = (verdict) => (verdict.level === "contradictory" ? "" : said(verdict.misfits));
+
+/** @param {Now} now @returns {Words} */
+function doneWords({ verdict }) {
+  const by = does(verdict);
+  return ["Done.", { key: "E", label: "export", action: "export" }, ...(misfits(verdict) ? [misfits(verdict), SHOW] : by.length ? ["Better:", ...by] : [])];
 }
 
-/** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
-function nextAction() {
-  const view = state.view;
-  if (!view) return null;
-  const { key, kind, option, done, pairs } = view.verdict;
-  const action = said(view.verdict.action);
-  const guesses = clicks().filter((click) => click.state === "untouched").length;
-  if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
-  const by = option === POSITION.option ? [POSITION] : kind === "CalibrateLens" ? [LENS] : option && option !== RANGE.option ? [{ key: "", label: "open this option", option }] : [];
-  const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => `#${nameOf(id)}`);
-  if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
-  if (option === RANGE.option) return BEYOND;
-  if (key === "N" && view.clicks.length && !state.placements.some(isOffered)) return null; // the last one is on its way
-  if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
-  const goOn = state.placements.some(isOffered) ? [NEXT] : [];
-  const met = pairs.find((id) => view.clicks.some((click) => click.id === id));
-  if (met !== undefined && key !== "J") return [action, { key: "", label: `show ${called(met)}`, pair: met }, ...goOn];
-  if (key === "J") return [action, SHOW];
-  const edge = kind === "SpreadPlacements" ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
-  if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : goOn)];
-  if (!state.placementsKnown) return ["Looking for placements. You can click meanwhile."];
-  return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
+/** What begins the verdict's action: a field or a panel. @param {import("../messages.js").VerdictRow} verdict @returns {Words} */
+const does = ({ option, kind }) => (option === POSITION.option ? [POSITION] : kind === "CalibrateLens" ? [LENS] : option && option !== RANGE.option ? [{ key: "", label: "open this option", option }] : []);
+
+/** The pair that the verdict's action is about. @param {import("../messages.js").VerdictRow} verdict @returns {Key[]} */
+const pairOf = ({ pairs }) => pairs.filter((id) => clicks().some((click) => click.id === id)).slice(0, 1).map((pair) => ({ key: "", label: `show ${called(pair)}`, pair }));
+
+/** @param {Now} now @returns {Words} */
+function edgeWords({ verdict, open }) {
+  const edge = open.reduce((one, other) => (Math.abs(other.azimuth_deg) > Math.abs(one.azimuth_deg) ? other : one));
+  return [said(verdict.action), ...does(verdict), { key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }];
 }

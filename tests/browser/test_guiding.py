@@ -19,9 +19,28 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     page.click(u + (200 if u < 480 else -200), v)
     page.press("n")
     page.until("__cocalib.state.view.clicks.filter((click) => click.state === 'outlier').length === 1")
+    page.go_to(0)
+    assert rule(page) == "misfits"
+    assert "#10 " in page.text("#guide")
     page.press("j")
     page.until(f"__cocalib.state.shown.index === {page.frame_at(wrong['best_image_time'])}")
-    assert "exclude it" in page.text("#guide")
+    assert rule(page) == "misfit"
+    page.press("x")
+    page.go_to(0)
+    assert rule(page) == "next", "what is excluded is named no more"
+
+
+def rule(page: Driver) -> str:
+    """Return the name of the rule by which the line on the frame says what it says."""
+    return str(page.page.get_attribute("#guide", "data-rule"))
+
+
+def test_of_four_pairs_with_a_wrong_one_one_more_placement_is_asked_for(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    wrong = {**truth["placements"][2], "pixel_px": [40.0, 40.0]}
+    page.load_sample({**truth, "placements": [*truth["placements"][:2], wrong, *truth["placements"][3:]]}, 4)
+    assert (page.view["verdict"]["level"], page.view["verdict"]["key"]) == ("coarse", "N")
+    assert rule(page) == "one-more"
 
 
 def test_a_maximum_range_that_leaves_all_returns_out_is_named_with_its_field(page: Driver, truth: Any) -> None:
@@ -143,4 +162,4 @@ def test_a_pair_that_does_not_fit_is_called_alike_everywhere_whatever_its_id(
     for other in ("#4", "#6", "#16"):
         assert other not in page.text("#guide") + page.text("#verdict")
     page.go_to(page.frame_at(truth["placements"][0]["best_image_time"]))
-    assert "#5 disagrees" not in page.text("#guide")
+    assert rule(page) == "misfits", "as long as it is set aside, it is named"

@@ -1,7 +1,7 @@
 """Build the View of a session, in one pure call; and the same figures of a calibration as lines of text."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,7 +10,7 @@ from calib_core.association.placement_groups import linked_clicks
 from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.options import GatingOptions
-from calib_core.results import Calibration, DataWarning, NextPlacement
+from calib_core.results import Calibration, DataWarning, NextPlacement, PairResult
 from calib_core.results.actions import (
     Action,
     ChooseReturn,
@@ -20,7 +20,15 @@ from calib_core.results.actions import (
     ReviewPairs,
     SetOption,
 )
-from calib_core.results.verdict import SURE_PAIRS, Verdict, by_consequence, consequence_of, stated_error, verdict_on
+from calib_core.results.verdict import (
+    SURE_PAIRS,
+    Verdict,
+    VerdictLevel,
+    by_consequence,
+    consequence_of,
+    stated_error,
+    verdict_on,
+)
 from calib_core.words.outcomes import by_cause, in_sentences
 from calib_core.words.text import Words, listed, named, say, sentence, words
 from calib_core.words.verdict import (
@@ -33,8 +41,8 @@ from calib_core.words.verdict import (
     verdict_rest,
 )
 from cocalib.session.applying import History
-from cocalib.session.state import RecordingFacts, Session
-from cocalib.view.click_rows import click_rows
+from cocalib.session.state import Outcome, RecordingFacts, Session
+from cocalib.view.click_rows import click_rows, disagreement
 from cocalib.view.figures import (
     assumed_figures,
     firm_text,
@@ -228,7 +236,6 @@ def _line(figure: Figure, width: int) -> str:
 
 _SAME_M = 0.5
 _MOST_NAMED = 6
-_OF_PAIRS = ("doubtful-pair", "agreeing-outliers", "many-outliers")
 
 
 def placements_left(session: Session, placements: Sequence[Placement] | None) -> int | None:
@@ -260,30 +267,25 @@ def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence
 
 
 def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placement] | None) -> VerdictRow:
-    """Return the verdict for the page; as long as only more pairs are missing, how many there are, and how far they lead."""
+    """Return the verdict for the page: by the first rule that holds while pairs are few, else as it is stated."""
     left = placements_left(session, placements)
-    early = Words()
-    if verdict.level not in ("good", "usable"):
-        early = _early_line(session) or (_large_so_far(verdict, session) if left != 0 else Words())
-    worst = _fits_worst(session) if early else ""
-    action = ReviewPairs((worst,)) if worst else action_of(verdict)
-    asked = (
-        say("Is the mark of {pair} on the inner corner?", pair=named(worst))
-        if worst
-        else sentence(action_words(verdict))
-    )
+    seen = _Pairs.of(verdict, session, left)
+    rule = next((rule for rule in _RULES if rule.holds(seen)), _AS_STATED)
+    action = ReviewPairs((seen.suspect,)) if rule.asks else action_of(verdict)
+    asked = say("Is the mark of {pair} on the inner corner?", pair=named(seen.suspect)) if rule.asks else Words()
     return VerdictRow(
-        level=verdict.level,
-        word="" if early else verdict.level,
-        line=early or verdict_rest(verdict).with_degree_signs(),
-        action=asked,
+        level=rule.level or verdict.level,
+        word="" if rule.line else verdict.level,
+        line=rule.line(seen) if rule.line else verdict_rest(verdict).with_degree_signs(),
+        action=asked or sentence(action_words(verdict)),
         assumes=sentence("assumes " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
         kind=type(action).__name__,
         pairs=action.ids if isinstance(action, ReviewPairs | ChooseReturn) else (),
-        key="" if worst else "N" if early and left else _key(verdict, session, left),
+        key="" if rule.asks else "N" if rule.line and left else _key(verdict, left),
         option=_option(action, session),
         done=verdict.done,
-        early=bool(early) and not worst,
+        early=rule.calm,
+        misfits=say("{pairs} fit.", pairs=_do_not(seen.misfits)) if seen.misfits else Words(),
     )
 
 
@@ -292,60 +294,179 @@ _SUSPECT = 0.05
 """A pair that is an outlier with more than this probability is worth a look while there are few: 4 of 100 sound sets have one."""
 
 
-def _early_line(session: Session) -> Words:
-    """Return how many pairs there are of those that the verdict needs; nothing if there are enough, or something else is wrong.
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """What the rules of the verdict's line ask.
 
-    With fewer, a second pose that fits is what few pairs look like: it contradicts nothing until they are enough.
+    Attributes:
+        verdict: on the latest outcome.
+        outcome: the latest one; None before any click.
+        clicks: how many there are.
+        left: how many placements have no click; None if that is not known.
+        used: the pairs that are not excluded.
+        misfits: ids of those that are set aside because they do not fit the others.
+        suspect: id of the one that may be an outlier although the few others cannot tell; "" if there is none.
     """
-    outcome = session.outcome if session.clicks else None
-    if outcome is None:
-        return words("No answer yet" if session.clicks else "No clicks yet")
-    if isinstance(outcome, Unsolvable):
-        waits = outcome.code == "too-few-pairs" and not outcome.unpaired
-        return words(f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else "")
-    used = [pair for pair in outcome.pairs if not pair.excluded]
-    grave = [warning.code for warning in outcome.warnings if consequence_of(warning.code) not in ("limited", "note")]
-    sound = all(pair.inlier for pair in used) and all(code in _MORE_PAIRS_DECIDE for code in grave)
-    if not outcome.options.models_noise or len(used) >= SURE_PAIRS or not sound:
-        return Words()
-    worst = _fits_worst(session)
-    seems = words("two answers fit so far" if "two-poses" in grave else "looks consistent")
-    if worst:
-        seems = say("check {pair}", pair=named(worst))
-    return say("{count} of {needed} pairs; {seems}", count=len(used), needed=SURE_PAIRS, seems=seems)
+
+    verdict: Verdict
+    outcome: Outcome | None
+    clicks: int
+    left: int | None
+    used: tuple[PairResult, ...] = ()
+    misfits: tuple[str, ...] = ()
+    suspect: str = ""
+
+    @classmethod
+    def of(cls, verdict: Verdict, session: Session, left: int | None) -> "_Pairs":
+        """Collect it from a session."""
+        outcome, clicks = session.outcome if session.clicks else None, len(session.clicks)
+        if not isinstance(outcome, Calibration):
+            return cls(verdict, outcome, clicks, left)
+        used = tuple(pair for pair in outcome.pairs if not pair.excluded)
+        aside = [pair.id for pair in used if not pair.inlier and pair.rival < 0]
+        doubt = max(((pair.outlier_probability, pair.id) for pair in used if pair.inlier), default=(0.0, ""))
+        return cls(
+            verdict,
+            outcome,
+            clicks,
+            left,
+            used,
+            tuple(aside) if disagreement(outcome.options).of_pair else (),
+            doubt[1] if doubt[0] > _SUSPECT else "",
+        )
+
+    @property
+    def waits(self) -> bool:
+        """Whether nothing but more pairs is missing for a first pose."""
+        outcome = self.outcome
+        return isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs" and not outcome.unpaired
+
+    @property
+    def one_wrong(self) -> bool:
+        """Whether all pairs but one agree, and too few to tell which one is wrong."""
+        outcome = self.outcome
+        return isinstance(outcome, Unsolvable) and outcome.facts == {"agreeing": MIN_PAIRS - 1, "pairs": MIN_PAIRS}
+
+    @property
+    def few(self) -> bool:
+        """Whether there is a pose of fewer pairs than a verdict needs, and nothing is wrong that more would not settle."""
+        if not isinstance(self.outcome, Calibration) or not self.outcome.options.models_noise:
+            return False
+        return self.agreeing < SURE_PAIRS and self._has(only=_MORE_PAIRS_DECIDE)
+
+    @property
+    def agreeing(self) -> int:
+        """How many pairs fit."""
+        return sum(pair.inlier for pair in self.used)
+
+    @property
+    def agree(self) -> bool:
+        """Whether all pairs fit."""
+        return self.agreeing == len(self.used)
+
+    @property
+    def large(self) -> bool:
+        """Whether only the size of the error is wrong, all pairs agree, and placements are left."""
+        return self.verdict.is_only_large and self.left != 0 and self.agree
+
+    @property
+    def open_return(self) -> bool:
+        """Whether a pair is set aside because nobody has chosen its return."""
+        return any(not pair.inlier and pair.rival >= 0 for pair in self.used)
+
+    @property
+    def two_poses(self) -> bool:
+        """Whether a second pose fits, as it does for few pairs: that contradicts nothing until they are enough."""
+        return not self._has(only=tuple(code for code in _MORE_PAIRS_DECIDE if code != "two-poses"))
+
+    def _has(self, only: tuple[str, ...]) -> bool:
+        """Whether all grave warnings are among these codes."""
+        warnings = self.outcome.warnings if isinstance(self.outcome, Calibration) else ()
+        grave = (one.code for one in warnings if consequence_of(one.code) not in ("limited", "note"))
+        return all(code in only for code in grave)
+
+    def counted(self, what: Words | str) -> Words:
+        """Return how many pairs there are of those that a verdict needs, and what is to be said of them."""
+        return say("{count} of {needed} pairs; {what}", count=self.agreeing, needed=SURE_PAIRS, what=what)
+
+    def within(self, what: Words | str) -> Words:
+        """Return how many pairs there are, what is to be said of them, and how large the error still is."""
+        assert isinstance(self.outcome, Calibration)  # of a rule that holds for a large error
+        within = error_text(stated_error(self.outcome))
+        return say("{count} pairs{what}; so far within {within}", count=len(self.used), what=what, within=within)
+
+    @property
+    def check(self) -> Words:
+        """The suspect, to be checked."""
+        return say("check {pair}", pair=named(self.suspect))
 
 
-def _large_so_far(verdict: Verdict, session: Session) -> Words:
-    """Return how many pairs agree, and how large the error still is; nothing if a pair does not agree, or something is wrong."""
-    outcome = session.outcome
-    if not isinstance(outcome, Calibration) or not verdict.is_only_large:
-        return Words()
-    pairs = [pair for pair in outcome.pairs if not pair.excluded]
-    if not all(pair.inlier for pair in pairs):
-        return Words()
-    worst = _fits_worst(session)
-    agree = say("; check {pair}", pair=named(worst)) if worst else words(" agree")
-    within = error_text(stated_error(outcome))
-    return say("{count} pairs{agree}; so far within {within}", count=len(pairs), agree=agree, within=within)
+def _do_not(ids: tuple[str, ...]) -> Words:
+    return say("{ids} {do} not", ids=listed(ids), do="does" if len(ids) == 1 else "do")
 
 
-def _fits_worst(session: Session) -> str:
-    """Return the pair that may be an outlier although the few others cannot tell; "" if there is none."""
-    pairs = session.outcome.pairs if isinstance(session.outcome, Calibration) else ()
-    worst = max((pair for pair in pairs if pair.inlier), key=lambda pair: pair.outlier_probability, default=None)
-    return worst.id if worst is not None and worst.outlier_probability > _SUSPECT else ""
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """A line of the verdict.
+
+    Attributes:
+        holds: when it is said.
+        line: what is said; None says the verdict as it is stated.
+        calm: nothing is wrong.
+        asks: whether the suspect's mark is on the inner corner.
+        level: instead of the verdict's; "" keeps that.
+    """
+
+    holds: Callable[[_Pairs], bool]
+    line: Callable[[_Pairs], Words] | None
+    _: KW_ONLY
+    calm: bool = False
+    asks: bool = False
+    level: VerdictLevel | Literal[""] = ""
 
 
-def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N", "E", "J"]:
+_AS_STATED = _Rule(lambda _: True, None)
+_RULES = (
+    _Rule(lambda now: now.verdict.level in ("good", "usable"), None),
+    _Rule(lambda now: not now.clicks, lambda _: words("No clicks yet"), calm=True),
+    _Rule(lambda now: now.outcome is None, lambda _: words("No answer yet"), calm=True),
+    _Rule(lambda now: now.waits, lambda now: words(f"{_made(now)} of {SURE_PAIRS} pairs"), calm=True),
+    _Rule(lambda now: now.one_wrong, lambda _: words(f"One of the {MIN_PAIRS} does not fit"), level="coarse"),
+    _Rule(
+        lambda now: now.few and bool(now.misfits),
+        lambda now: now.counted(say("{ids} fit", ids=_do_not(now.misfits))),
+        level="coarse",
+    ),
+    _Rule(lambda now: now.few and now.open_return, lambda now: now.counted("a return is open"), level="coarse"),
+    _Rule(
+        lambda now: now.few and now.agree and bool(now.suspect),
+        lambda now: now.counted(now.check),
+        asks=True,
+        level="coarse",
+    ),
+    _Rule(
+        lambda now: now.few and now.agree and now.two_poses,
+        lambda now: now.counted("two answers fit so far"),
+        calm=True,
+    ),
+    _Rule(lambda now: now.few and now.agree, lambda now: now.counted("looks consistent"), calm=True),
+    _Rule(lambda now: now.large and bool(now.suspect), lambda now: now.within("; " + now.check), asks=True),
+    _Rule(lambda now: now.large, lambda now: now.within(" agree"), calm=True),
+)
+"""What is said while pairs are few, or many are left: the first that holds. From enough pairs on, the verdict as it is stated."""
+
+
+def _made(now: _Pairs) -> int:
+    return len(now.outcome.pairs) if now.outcome is not None else 0
+
+
+def _key(verdict: Verdict, left: int | None) -> Literal["", "N", "E"]:
     """Return the key of the page that does or begins the action."""
     if verdict.done:
         return "E"
-    if isinstance(verdict.cause, DataWarning) and verdict.level == "contradictory":
-        return "J" if verdict.cause.code in _OF_PAIRS else ""
     collecting = verdict.cause is None or verdict.cause.code == "too-few-pairs"
-    return (
-        "N" if left and (isinstance(verdict.action, ClickMore) or (verdict.level == "nothing" and collecting)) else ""
-    )
+    more = isinstance(verdict.action, ClickMore) or (verdict.level == "nothing" and collecting)
+    return "N" if left and more else ""
 
 
 def _option(action: Action, session: Session) -> str:

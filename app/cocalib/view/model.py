@@ -156,6 +156,9 @@ class Advice:
     words: str
 
 
+_NO_WORDS = Words()
+
+
 @dataclass(frozen=True, slots=True)
 class VerdictRow:
     """How far the calibration can be trusted, in one line, and what to do.
@@ -172,6 +175,7 @@ class VerdictRow:
         option: path of the option that does it; "" if there is none.
         done: nothing more is needed.
         early: nothing is wrong, there are only fewer pairs than the verdict needs; the line counts them.
+        misfits: which pairs are set aside because they do not fit the others, as a sentence; empty if there are none.
     """
 
     level: VerdictLevel
@@ -181,10 +185,11 @@ class VerdictRow:
     word: str = ""
     kind: str = ""
     pairs: tuple[str, ...] = ()
-    key: Literal["", "N", "E", "J"] = ""
+    key: Literal["", "N", "E"] = ""
     option: str = ""
     done: bool = False
     early: bool = False
+    misfits: Words = _NO_WORDS
 
 
 _UNCLICKED = VerdictRow("nothing", words("No clicks yet"), Words(), Words(), early=True)

@@ -19,8 +19,10 @@ from calib_core.results.actions import (
     FollowHint,
     PlaceReflector,
     ReduceError,
+    ReviewPairs,
     SetOption,
 )
+from calib_core.results.calibration import CovarianceParts
 from calib_core.results.verdict import by_consequence, stated_error, verdict_on
 
 FEW = Unsolvable.reported("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
@@ -160,6 +162,18 @@ def test_the_action_is_what_gains_most_a_placement_or_a_tape():
     assert shared.action == ReduceError(calibration.dominant_errors()[0].largest.name, measured=False)
     placed = verdict_on(replace(calibration, next_placement=replace(near, gain=9.0)))
     assert placed.action == PlaceReflector((3.0, 1.0, 0.0), 9.0)
+
+
+def test_clicks_are_to_be_checked_if_their_scatter_is_most_of_the_error(good):
+    parts = CovarianceParts(0.2 * good.covariance, np.zeros((6, 6)))
+    large = replace(good, covariance=400.0 * good.covariance, covariance_parts=parts, next_placement=None)
+    noisy = replace(large.metrics, chi2=2.0 * large.metrics.degrees_of_freedom)
+    action = verdict_on(replace(large, metrics=noisy)).action
+    assert isinstance(action, ReviewPairs)
+    assert len(action.ids) == 3
+    shared = CovarianceParts(0.9 * large.covariance, np.zeros((6, 6)))
+    for other in (large, replace(large, metrics=noisy, covariance_parts=shared)):
+        assert not isinstance(verdict_on(other).action, ReviewPairs)
 
 
 def test_placements_without_a_click_come_first_and_the_end_is_said():

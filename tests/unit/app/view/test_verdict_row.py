@@ -75,19 +75,34 @@ MIRRORED = DataWarning.reported("mirrored-axes", "an axis is mirrored", "turn it
 
 
 @pytest.mark.parametrize(
-    ("pairs", "warnings", "line"),
+    ("pairs", "warnings", "level", "line", "named"),
     [
-        (FIVE, (), "5 of 8 pairs; looks consistent"),
-        (FIVE, (TWO_POSES,), "5 of 8 pairs; two answers fit so far"),
-        ((*FIVE[:4], pair("c5", inlier=False)), (), ""),
-        (FIVE, (MIRRORED,), ""),
+        (FIVE, (), "early", "5 of 8 pairs; looks consistent", ()),
+        (FIVE, (TWO_POSES,), "early", "5 of 8 pairs; two answers fit so far", ()),
+        ((*FIVE[:4], replace(FIVE[4], outlier_probability=0.1)), (), "coarse", "5 of 8 pairs; check c5", ("c5",)),
+        ((*FIVE[:4], replace(FIVE[4], inlier=False, rival=1)), (), "coarse", "4 of 8 pairs; a return is open", ()),
+        ((*FIVE[:4], pair("c5", inlier=False)), (), "coarse", "4 of 8 pairs; c5 does not fit", ("c5",)),
+        ((*FIVE[:4], pair("c5", inlier=False)), (TWO_POSES,), "coarse", "4 of 8 pairs; c5 does not fit", ("c5",)),
+        (FIVE, (MIRRORED,), "contradictory", "", ()),
     ],
 )
-def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warnings, line):
-    found = calibration(*pairs)
-    row = shown(5, replace(found, warnings=warnings)).verdict
-    assert row.early == (line != "")
-    assert str(row.line) == line or not row.early
+def test_few_pairs_are_counted_and_the_one_that_does_not_fit_is_named(pairs, warnings, level, line, named):
+    row = shown(5, replace(calibration(*pairs), warnings=warnings)).verdict
+    assert "early" if row.early else row.level == level
+    assert str(row.line) == line or not line
+    assert not re.search("°|deg|cm", str(row.line)), "so few pairs state no error"
+    ids = tuple(part.pair for part in row.misfits.parts if isinstance(part, PairPart))
+    assert named == (ids or row.pairs)
+
+
+def test_of_four_pairs_with_a_wrong_one_a_further_placement_is_asked_for():
+    lost = Unsolvable("no-pose", {"agreeing": 3, "pairs": 4})
+    session = Session(clicks=(ReflectorClick(TimeNs(2 * 10**9), "c1", 1.0, 1.0),), outcome=lost)
+    found = [placement(1), placement(11)]
+    row = verdict_row(verdict_on(lost, left=1), session, found)
+    assert (row.level, row.early, row.key, row.kind) == ("coarse", False, "N", "FollowHint")
+    two = Unsolvable("no-pose", {"agreeing": 3, "pairs": 5})
+    assert verdict_row(verdict_on(two, left=1), replace(session, outcome=two), found).level == "contradictory"
 
 
 def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
@@ -100,7 +115,8 @@ def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_a
     agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
     row = verdict_row(coarse, agreeing, more)
     assert (row.early, f"within {error_text(error)}" in str(row.line)) == (True, True)
-    assert not verdict_row(coarse, apart, more).early
+    row = verdict_row(coarse, apart, more)
+    assert (row.early, PairPart("c9") in row.misfits.parts) == (False, True), "as long as one is set aside it is named"
     assert not verdict_row(replace(coarse, cause=OF_THE_LENS), agreeing, more).early
     assert not verdict_row(replace(coarse, error=None, unconfirmed=1), agreeing, more).early
     assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
@@ -109,12 +125,6 @@ def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_a
     assert (row.early, row.key) == (False, "")
     assert PairPart("c8") in row.line.parts
     assert (row.kind, row.pairs) == ("ReviewPairs", ("c8",))
-
-
-def test_of_few_pairs_the_one_that_fits_worst_is_named_in_a_colour() -> None:
-    doubted = calibration(*FIVE[:4], replace(FIVE[4], outlier_probability=0.1))
-    row = shown(5, doubted).verdict
-    assert (row.level, row.early, row.pairs) == ("coarse", False, (FIVE[4].id,))
 
 
 @pytest.mark.parametrize(
