@@ -94,7 +94,7 @@ const RULES = [
   { name: "coming", when: ({ verdict, open }) => verdict.key === "N" && clicks().length && !open.length, say: () => [] }, // the last one is on its way
   { name: "one-more", when: ({ verdict }) => verdict.key === "N" && verdict.kind === "FollowHint", say: ({ verdict }) => [said(verdict.action), NEXT] },
   { name: "next", when: ({ verdict }) => verdict.key === "N", say: () => [{ ...NEXT, label: proposalAdvice() }] },
-  { name: "pair", when: ({ verdict }) => pairOf(verdict), say: ({ verdict, open }) => [said(verdict.action), ...pairOf(verdict), ...onward(open)] },
+  { name: "pair", when: ({ verdict }) => pairOf(verdict).length, say: ({ verdict, open }) => [said(verdict.action), ...pairOf(verdict), ...onward(open)] },
   { name: "edge", when: ({ verdict, open }) => verdict.kind === "SpreadPlacements" && open.length, say: edgeWords },
   { name: "verdict", when: () => clicks().length, say: ({ verdict, open }) => [said(verdict.action), ...does(verdict), ...onward(open)] },
   { name: "searching", when: () => !state.placementsKnown, say: () => ["Looking for placements. You can click meanwhile."] },
@@ -136,8 +136,11 @@ const guesses = () => clicks().filter((click) => click.state === "untouched").le
 /** @returns {Words} */
 const guessWords = () => [guesses() > 1 ? `${guesses()} marks are guesses and do not count: move each to the inner corner` : "1 mark is a guess and does not count: move it to the inner corner"];
 
+/** What explains misfits better than a mark. */
+const OF_ALL = ["CalibrateLens", "SetOption"];
+
 /** The pairs that are set aside; "" without any, or if the answer itself is in question. @param {import("../messages.js").VerdictRow} verdict */
-const misfits = (verdict) => (verdict.level === "contradictory" ? "" : said(verdict.misfits));
+const misfits = (verdict) => (verdict.level === "contradictory" || OF_ALL.includes(verdict.kind) ? "" : said(verdict.misfits));
 
 /** @param {Now} now @returns {Words} */
 function doneWords({ verdict }) {
