@@ -1,6 +1,6 @@
 /**
- * The export panel: a preview of every format, with its numbers, its check point and what it rests on; the clicks, saved or added from
- * a file.
+ * The page Deliver: a preview of every format, with its numbers, its check point and what it rests on; the report, as it is; the
+ * clicks, saved or added from a file.
  */
 
 import { register, withImages } from "../base/actions.js";
@@ -17,25 +17,17 @@ import { drawFormats, focusFormats, formatColumn } from "./list.js";
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const REPORT = "report";
-const IN_REPORT = [
-  "Answer: verdict, transform both ways, error bars",
-  "Cautions: warnings, and what to do",
-  "Uncertainty in the image at 5, 20 and 60 m",
-  "Residuals against range, azimuth, position and time",
-  "Coverage of image and range",
-  "Pairs",
-  "Provenance: files by their hashes, options, versions",
-];
 /** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
 const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
 const ASKING = "Asking the server for the file…";
-const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const page = /** @type {HTMLElement} */ (document.getElementById("page-deliver"));
 /** @type {Format[]} */
 let formats = [];
 /** @type {{format: string, parent: string[]}} */
 let kept = { format: "json", parent: [...IDENTITY] };
 let asked = 0;
+/** The state of the session that is shown. */
+let drawn = "";
 
 const head = make("div", "what", []);
 const names = nameFields(() => load());
@@ -46,6 +38,7 @@ const despite = despiteBox(() => load());
 let parent;
 const before = make("div", "before", []);
 const text = make("pre", "text", "");
+const report = make("iframe", "report", []);
 const notes = make("ul", "notes", []);
 const side = make("aside", "", []);
 const fileName = make("input", "", []);
@@ -55,8 +48,7 @@ const retry = make("button", "second", "Try again");
 
 export function startExporting() {
   register(
-    { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withImages },
-    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: () => openExport(), when: withImages },
+    { id: "export", group: "File", words: "Export the calibration, the report or the clicks", keys: ["E"], also: "deliver tab save download write file json yaml urdf tf format", run: openExport, when: withImages },
     { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withImages },
   );
   try {
@@ -65,20 +57,22 @@ export function startExporting() {
     // Without storage, the choice is just not remembered.
   }
   build();
-  dialog.addEventListener("keydown", trap);
-  dialog.addEventListener("cancel", () => /** @type {HTMLElement|null} */ (document.activeElement)?.blur()); // the next key is not for a field that is going
-  dialog.addEventListener("click", (event) => {
-    if (event.target === dialog) dialog.close();
-  });
   retry.onclick = load;
-  on(["view"], () => void (dialog.open && load()));
+  on(["view", "box"], loadChanged);
   on(["recording"], () => {
     names.typed.clear();
     loadFormats();
   });
-  on(["connection"], () => {
-    if (dialog.open) load(); // the server is back, or gone
-  });
+  on(["connection"], load); // the server is back, or gone
+}
+
+/** Ask for the chosen format again, if the page is shown and the session has changed. */
+function loadChanged() {
+  const { revision, solved_revision, solving, has_calibration } = state.view ?? {};
+  const now = [revision, solved_revision, solving, has_calibration].join();
+  if (page.hidden || !state.recording || now === drawn) return;
+  drawn = now;
+  load();
 }
 
 /** Ask for the formats that the server can write. */
@@ -91,42 +85,16 @@ async function loadFormats() {
   drawList();
 }
 
-/** What the page Deliver offers. @type {[string, string, string, string][]} */
-const DELIVERED = [
-  ["export", "Export…", "", "The pose, for ROS, Autoware, Kalibr and others"],
-  ["report", "Report…", REPORT, "Accuracy report (HTML)"],
-  ["clicks", "Clicks…", CLICKS, "Continue on another computer"],
-];
-
-export function startDelivering() {
-  page.append(make("dl", "delivered", DELIVERED.flatMap(([id, label, format, about]) => {
-    const button = make("button", "second", label);
-    button.id = id;
-    button.setAttribute("aria-haspopup", "dialog");
-    button.onclick = () => openExport(format || (kept.format in PLAIN ? "json" : kept.format));
-    return [make("dt", "", [button]), make("dd", "", about)];
-  })));
-}
-
-/** @param {string} [format] the one before if none is given */
-function openExport(format = kept.format) {
-  if (dialog.open || !state.recording) return;
-  keep({ format });
-  drawList();
-  drawReason(ASKING);
-  dialog.showModal();
+function openExport() {
+  drawn = "";
+  showPage("deliver");
   focusFormats();
-  load();
 }
 
 function build() {
-  const close = make("button", "icon close", "×");
-  close.setAttribute("aria-label", "Close");
-  close.onclick = () => dialog.close();
-  const title = make("h2", "", "Export");
-  title.id = "export-title";
   text.tabIndex = 0;
   text.setAttribute("aria-label", "File content");
+  report.title = "Report";
   fileName.type = "text";
   fileName.spellcheck = false;
   fileName.setAttribute("aria-label", "File name");
@@ -144,8 +112,10 @@ function build() {
     returns.chosen = "";
     load();
   });
-  const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, returns.row, rectified.row, despite.row, parent.element, before, text, notes]), side, foot);
+  const foot = make("div", "foot", [make("span", "gap", ""), make("label", "name", [make("span", "", "File name"), fileName]), copy, save]);
+  page.append(list, make("section", "", [head, loader, names.element, returns.row, rectified.row, despite.row, parent.element, before, text, report, notes]), side, foot);
+  drawList();
+  drawReason(ASKING);
 }
 
 /** The formats, and the clicks and the report as two of them. */
@@ -155,21 +125,9 @@ function drawList() {
   drawFormats([...formats, clicks, report], kept.format);
 }
 
-/** Keep Tab inside the panel. @param {KeyboardEvent} event */
-function trap(event) {
-  if (event.key !== "Tab") return;
-  const stops = /** @type {HTMLElement[]} */ ([...dialog.querySelectorAll("button, input:not([type=file]), label[tabindex], summary, pre")]).filter(
-    (stop) => stop.tabIndex >= 0 && !stop.hasAttribute("disabled") && stop.offsetParent !== null,
-  );
-  const [first, last] = [stops[0], stops[stops.length - 1]];
-  const leaving = event.shiftKey ? first : last;
-  if (document.activeElement !== leaving) return;
-  event.preventDefault();
-  (event.shiftKey ? last : first).focus();
-}
-
 /** Ask the server for the text of the chosen format; only the newest answer is drawn. */
 async function load() {
+  if (page.hidden || !state.recording) return;
   const mine = ++asked;
   if (!formats.length) await loadFormats();
   const key = kept.format;
@@ -179,7 +137,7 @@ async function load() {
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
   else if (key === CLICKS) drawClicks(said);
   else if (said.reason) drawReason(said.reason, false, key === REPORT ? null : said.field);
-  else if (key === REPORT) drawReport(said);
+  else if (key === REPORT) drawReport();
   else drawPreview(said);
 }
 
@@ -228,14 +186,14 @@ function drawClicks(content) {
   for (const part of [before, notes, side]) part.replaceChildren();
 }
 
-/** Say what the report contains; it is written when it is downloaded. @param {Preview} preview of calibration.json */
-function drawReport(preview) {
+/** Show the report as it is. */
+function drawReport() {
   head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser without a network, prints to at most four pages"));
   drawFields({});
-  show(IN_REPORT.join("\n"), "report.html", true);
-  notes.replaceChildren();
-  before.replaceChildren();
-  side.replaceChildren(...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words)] : []));
+  show("", "report.html", true);
+  [text.hidden, report.hidden] = [true, false];
+  report.src = `${PLAIN[REPORT]}?shown=1`;
+  for (const part of [before, notes, side]) part.replaceChildren();
 }
 
 /** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */
@@ -245,6 +203,7 @@ function drawReason(reason, canRetry = false, field = null) {
   names.refuse(field === "frames" ? reason : "");
   parent.refuse(field === "parent" ? reason : "");
   const words = field === "frames" || field === "parent" ? "There is no file until the field above is corrected." : reason.trim();
+  [text.hidden, report.hidden] = [false, true];
   text.replaceChildren(make("div", "reason", [...(reason === ASKING ? [] : [icon("warning")]), make("span", "", words), ...(canRetry ? [retry] : [])]));
   for (const part of [before, notes, side]) part.replaceChildren();
   fileName.value = "";
@@ -253,6 +212,7 @@ function drawReason(reason, canRetry = false, field = null) {
 
 /** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, returns?: boolean, despite?: boolean}} shown */
 function drawFields(shown) {
+  loader.hidden = kept.format !== CLICKS;
   names.element.hidden = !shown.names;
   parent.element.hidden = !shown.parent;
   rectified.row.hidden = !shown.rectified;
@@ -265,6 +225,7 @@ function drawFields(shown) {
 function show(content, name, isBinary) {
   if (fileName.dataset.suggested !== name || !fileName.value) fileName.value = name;
   fileName.dataset.suggested = name;
+  [text.hidden, report.hidden] = [false, true];
   text.replaceChildren(...lines(content));
   text.scrollTop = 0;
   for (const control of [fileName, save]) control.disabled = false;
@@ -307,8 +268,6 @@ field.accept = ".json,application/json";
 field.onchange = async () => {
   const file = field.files?.[0];
   if (!file) return;
-  const dialog = /** @type {HTMLDialogElement|null} */ (document.querySelector("dialog[open]"));
-  dialog?.close();
   const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
   if (refusal) toast(refusal);
   field.value = "";
@@ -318,14 +277,12 @@ field.onchange = async () => {
 function loadClicks() {
   field.click();
 }
+field.onclick = (event) => event.stopPropagation();
 
-/** The button of the export dialog, with the field behind it. */
-function importer() {
-  const open = make("button", "second", "Load clicks…");
-  open.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
-  open.onclick = loadClicks;
-  return make("span", "", [open, field]);
-}
+/** The button, shown with the clicks, and the field behind it. */
+const loader = make("div", "loader", [make("button", "second", "Load clicks…"), field]);
+loader.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
+loader.onclick = loadClicks;
 
 /** FileNumbers of app/cocalib/web/exports.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
 /** CheckPointRow of app/cocalib/web/exports.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */

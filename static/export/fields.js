@@ -1,5 +1,5 @@
 /**
- * What the user fills in on the export panel: frame names, the radar's pose in a third frame, whether images are rectified; and the
+ * What the user fills in on the page Deliver: frame names, the radar's pose in a third frame, whether images are rectified; and the
  * drawing of the axes with the direction of the file's transform.
  */
 
@@ -145,7 +145,7 @@ export function returnsChoice(changed) {
   function draw(other) {
     if (!other) return;
     for (const button of buttons) button.checked = button.value !== other.is_for;
-    gain.textContent = `${RETURNS[other.is_for]}: ${other.gain}`;
+    gain.textContent = `${other.is_for === "raw" ? "as reported" : "corrected"}: ${other.gain}`;
   }
   return choice;
 }

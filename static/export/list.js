@@ -1,4 +1,4 @@
-/** The list of the export panel: formats under the heading of where they are used, and a field to find one by typing. */
+/** The list of the page Deliver: formats under the heading of where they are used, and a field to find one by typing. */
 
 import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
@@ -41,13 +41,12 @@ export function drawFormats(given, key) {
   draw();
 }
 
-/** Show all formats again and give the chosen one the focus. */
+/** Show all formats again, to be searched. */
 export function focusFormats() {
   field.value = "";
   draw();
-  const item = options().find((one) => one.dataset.export === chosen);
-  (item ?? field).focus();
-  item?.scrollIntoView({ block: "nearest" });
+  field.focus();
+  options().find((one) => one.dataset.export === chosen)?.scrollIntoView({ block: "nearest" });
 }
 
 const options = () => /** @type {HTMLElement[]} */ ([...list.querySelectorAll("[data-export]")]);
@@ -86,6 +85,7 @@ function option(format) {
   item.id = `export-${format.key}`;
   item.setAttribute("role", "option");
   item.dataset.export = format.key;
+  item.dataset.roves = "ArrowUp ArrowDown Home End";
   item.onclick = () => choose(format.key, true);
   return item;
 }
@@ -121,22 +121,19 @@ function target(event) {
   return to === undefined ? undefined : items[Math.max(0, Math.min(items.length - 1, to))]?.dataset.export;
 }
 
-/** In the list, arrows choose, and a letter starts a search. @param {KeyboardEvent} event */
+/** In the list, arrows choose. @param {KeyboardEvent} event */
 function walk(event) {
   const key = target(event);
-  if (key !== undefined) {
-    event.preventDefault();
-    choose(key, true);
-  } else if (event.key.length === 1 && event.key !== " " && !event.ctrlKey && !event.metaKey && !event.altKey) {
-    field.focus(); // the letter is typed there
-    field.select();
-  }
+  if (key === undefined) return;
+  event.preventDefault();
+  choose(key, true);
 }
 
 /** While typing, arrows choose, and Enter takes the first that fits. @param {KeyboardEvent} event */
 function typing(event) {
   const items = options();
-  if (event.key === "Enter" && items.length) {
+  if (event.key === "Escape") field.blur();
+  else if (event.key === "Enter" && items.length) {
     event.preventDefault();
     const current = items.find((item) => item.dataset.export === chosen) ?? items[0];
     choose(String(current.dataset.export), true);

@@ -271,7 +271,7 @@ const legend = /** @type {HTMLElement} */ (document.getElementById("legend"));
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 const TRAILS_S = [0, 2, 10];
 /** Controls that need images. */
-const NEED_IMAGES = ["undo", "redo", "export"];
+const NEED_IMAGES = ["undo", "redo"];
 
 export function startLooking() {
   startBirdseye();

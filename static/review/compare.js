@@ -151,7 +151,7 @@ function draw() {
   rows.replaceChildren(...known.rows.map((row) => make("tr", "", [make("td", "", row.label), make("td", "", row.text)])));
 }
 
-/** A calibration file dropped anywhere becomes B; files of clicks go to the export dialog as before. */
+/** A calibration file dropped anywhere becomes B; files of clicks go where they are loaded. */
 function listenToDrops() {
   const page = /** @type {HTMLElement} */ (document.getElementById("panel"));
   page.addEventListener("dragover", (event) => {

@@ -66,18 +66,17 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     user.click("#sheet-close")
     user.click("#tab-mark")
     look("pairs with an excluded one")
-    for key, selector in (("?", "#help-dialog"), ("Control+k", "#palette"), ("e", "#export-dialog")):
+    for key, selector in (("?", "#help-dialog"), ("Control+k", "#palette")):
         user.keyboard.press(key)
         user.locator(f"{selector}[open]").wait_for()
-        if key == "e":
-            expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
         look(selector)
         user.keyboard.press("Escape")
     user.keyboard.press("e")
-    expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
-    user.fill("#export-dialog [data-field=radar_frame]", "")
-    user.locator("#export-dialog .names .error").wait_for()
-    user.fill("#export-dialog .find", "ros")
+    expect(user.locator("#page-deliver .text")).to_contain_text("camera_from_radar")
+    look("#page-deliver")
+    user.fill("#page-deliver [data-field=radar_frame]", "")
+    user.locator("#page-deliver .names .error").wait_for()
+    user.fill("#page-deliver .find", "ros")
     look("export with a refused frame name, some formats")
     user.keyboard.press("Escape")
     for width, height in ((1024, 700), (640, 700)):

@@ -28,9 +28,8 @@ def test_clicking_every_placement_gives_a_calibration_near_the_truth(page: Drive
     assert page.text("#verdict .aed") == f"AED {aed} px"
     page.until("__cocalib.state.overlay.returns !== null && __cocalib.state.overlay.guesses.length > 0")
     page.page.click("#tab-deliver")
-    page.page.click("#export")
     with page.page.expect_download() as download:
-        page.page.click("#export-dialog .first")
+        page.page.click("#page-deliver .first")
     saved = tmp_path / "calibration.json"
     download.value.save_as(saved)
     calibration, true = json.loads(saved.read_text()), truth["camera_from_radar"]

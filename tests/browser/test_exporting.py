@@ -1,4 +1,4 @@
-"""The export panel: what is shown is what is saved, and a keyboard is enough."""
+"""The page Deliver: what is shown is what is saved, and a keyboard is enough."""
 
 import json
 import re
@@ -19,7 +19,7 @@ from tests.browser.driving import Driver
 from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
-DIALOG = "#export-dialog"
+DIALOG = "#page-deliver"
 RECTIFIED = f"{DIALOG} .rectified:not(.returns):not(.despite) input"
 
 
@@ -63,7 +63,6 @@ def saved(page: Driver, folder: Path) -> Path:
 
 def test_before_a_calibration_the_panel_says_what_is_missing_and_gives_the_clicks(page: Driver, tmp_path: Path) -> None:
     page.page.click("#tab-deliver")
-    page.page.click("#export")
     expect(page.page.locator(f"{DIALOG} .reason")).to_contain_text("four placements")
     expect(page.page.locator(f"{DIALOG} .first")).to_be_disabled()
     choose(page, "clicks")
@@ -74,7 +73,6 @@ def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibr
     solved: Driver, tmp_path: Path
 ) -> None:
     solved.page.click("#tab-deliver")
-    solved.page.click("#export")
     choose(solved, "json")
     reference = read_any_file(saved(solved, tmp_path))
     for name in ("tf2", "kitti", "matlab", "colmap"):  # text, for rectified images, and binary files of each kind
@@ -100,7 +98,6 @@ def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibr
 def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(solved: Driver) -> None:
     page, shown = solved.page, {}
     page.click("#tab-deliver")
-    page.click("#export")
     for name, rightwards, equation in (
         ("tf2", False, "p_radar = R p_camera + t"),
         ("opencv", True, "p_camera = R p_radar + t"),
@@ -135,13 +132,13 @@ def test_the_check_point_is_said_and_marked_on_the_image_and_the_evidence_is_the
 ) -> None:
     page = solved.page
     page.click("#tab-deliver")
-    page.click("#export")
+    page.click("#panel-large")
     choose(solved, "opencv")
     point = solved.value("fetch('api/preview/opencv').then((answer) => answer.json())")["check_point"]
     said = page.locator(f"{DIALOG} .check-point figcaption")
     expect(said).to_contain_text(f"must project to pixel ({point['u_px']:.2f}, {point['v_px']:.2f})")
     assert solved.value(
-        "fetch(document.querySelector('#export-dialog .inset image').getAttribute('href'))"
+        "fetch(document.querySelector('#page-deliver .inset image').getAttribute('href'))"
         ".then((answer) => answer.blob()).then(createImageBitmap).then((made) => [made.width, made.height])"
     ) == [point["width_px"], point["height_px"]]
     ring = page.locator(f"{DIALOG} .inset .mark circle")
@@ -160,7 +157,7 @@ def test_the_check_point_is_said_and_marked_on_the_image_and_the_evidence_is_the
 def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> None:
     page = solved.page
     page.keyboard.press("e")
-    expect(page.locator(f'{DIALOG} [data-export="json"]')).to_be_focused()
+    expect(page.locator(f"{DIALOG} .find")).to_be_focused()
     names = f"[...document.querySelectorAll('{DIALOG} [data-export]')].map((item) => item.dataset.export)"
     everything = solved.value(names)
     for words, first, others in (
@@ -177,8 +174,8 @@ def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> N
     page.keyboard.press("Enter")
     expect(page.locator(f'{DIALOG} [data-export="tf2"]')).to_be_focused()
     expect(page.locator(f"{DIALOG} .text")).to_contain_text("static_transform_publisher")
-    page.keyboard.type("kalibr")  # a letter in the list goes on searching
-    expect(page.locator(f"{DIALOG} .find")).to_have_value("kalibr")
+    page.keyboard.press("e")
+    page.keyboard.type("kalibr")
     page.keyboard.press("ArrowDown")
     expect(page.locator(f"{DIALOG} .find")).to_be_focused()
     expect(page.locator(f"{DIALOG} .text")).to_contain_text("T_cam_radar")
@@ -195,7 +192,6 @@ def test_frames_and_file_get_the_names_that_the_user_types_and_a_wrong_one_is_re
 ) -> None:
     page = solved.page
     page.click("#tab-deliver")
-    page.click("#export")
     choose(solved, "tf2")
     radar, camera = (page.locator(f'{DIALOG} [data-field="{name}_frame"]') for name in ("radar", "camera"))
     text, error = page.locator(f"{DIALOG} .text"), page.locator(f"{DIALOG} .names .error")
@@ -223,7 +219,6 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     solved: Driver, tmp_path: Path
 ) -> None:
     solved.page.click("#tab-deliver")
-    solved.page.click("#export")
     choose(solved, "autoware")
     before = read_any(saved(solved, tmp_path).read_bytes())
     solved.page.fill('[aria-label="x of the radar in the parent frame"]', "3.5")
@@ -251,7 +246,6 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_
 ) -> None:
     page = solved.page
     page.click("#tab-deliver")
-    page.click("#export")
     choose(solved, "opencv")
     expect(page.locator(RECTIFIED)).to_be_hidden()
     for name in ("kitti", "nuscenes"):
@@ -263,10 +257,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_
         with zipfile.ZipFile(saved(solved, tmp_path)) as archive:
             assert archive.namelist() == [format_named(name).file_name, "rectification.npz"]
 
-    for _ in range(8):
-        page.keyboard.press("Tab")
-        if page.locator(RECTIFIED).evaluate("box => box === document.activeElement"):
-            break
+    page.locator(RECTIFIED).focus()
     page.keyboard.press("Space")
     expect(page.locator(f"{DIALOG} .notes")).to_contain_text("Written for rectified images")
     expect(page.locator(RECTIFIED)).to_be_focused()
@@ -279,7 +270,6 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_
     page.reload()
     solved.until("__cocalib.state.shown && __cocalib.state.view.has_calibration")
     page.click("#tab-deliver")
-    page.click("#export")
     expect(page.locator(f'{DIALOG} [data-export="tf2"]')).to_have_attribute("aria-selected", "true")
     expect(page.locator(f"{DIALOG} .text")).to_contain_text("static_transform")
     page.click(f'{DIALOG} [data-export="kitti"]')
@@ -288,28 +278,50 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_
     expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
 
 
-def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:
+def test_a_keyboard_is_enough(solved: Driver, tmp_path: Path) -> None:
     solved.page.keyboard.press("e")
+    solved.page.keyboard.press("Tab")
     expect(solved.page.locator(f'{DIALOG} [data-export="json"]')).to_be_focused()
+    frame = solved.value("__cocalib.state.cursor")
     solved.page.keyboard.press("ArrowDown")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("static_transform_publisher")
-    frame = solved.value("__cocalib.state.cursor")
-    for _ in range(12):
-        solved.page.keyboard.press("Tab")
-        assert solved.value(f"document.querySelector('{DIALOG}').contains(document.activeElement)")
-    solved.page.keyboard.press("Shift+Tab")
-    assert solved.value(f"document.querySelector('{DIALOG}').contains(document.activeElement)")
-    solved.page.keyboard.press("x")
     assert solved.value("__cocalib.state.cursor") == frame
-    assert all(click["state"] != "excluded" for click in solved.view["clicks"])
-    solved.page.keyboard.press("Escape")
-    assert not solved.page.is_visible(DIALOG)
+    for _ in range(20):
+        solved.page.keyboard.press("Tab")
+        if solved.page.locator(f"{DIALOG} .first").evaluate("button => button === document.activeElement"):
+            break
+    with solved.page.expect_download() as download:
+        solved.page.keyboard.press("Enter")
+    assert download.value.suggested_filename == "sample_static_transform.sh"
+
+
+def test_which_returns_the_pose_is_for_is_chosen_and_the_file_follows(solved: Driver, tmp_path: Path) -> None:
+    solved.page.click("#tab-deliver")
+    for name, held, other in (("opencv", "raw", "corrected"), ("tf2", "corrected", "raw")):
+        choose(solved, name)
+        expect(solved.page.locator(f"{DIALOG} .returns [value={held}]")).to_be_checked()
+        assert read_any_file(saved(solved, tmp_path)).for_raw is (held == "raw")
+        before = solved.text(f"{DIALOG} .text")
+        solved.page.check(f"{DIALOG} .returns [value={other}]")
+        expect(solved.page.locator(f"{DIALOG} .text")).not_to_have_text(before)
+        assert read_any_file(saved(solved, tmp_path)).for_raw is (other == "raw")
+    choose(solved, "json")
+    expect(solved.page.locator(f"{DIALOG} .returns")).to_be_hidden()
+
+
+def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
+    solved.page.click("#tab-deliver")
+    choose(solved, "tf2")
+    solved.page.click("#panel-large")
+    box = solved.page.locator(DIALOG).bounding_box()
+    assert box is not None
+    assert box["width"] > 0.99 * solved.value("innerWidth")
+    expect(solved.page.locator(f"{DIALOG} .check-point")).to_be_in_viewport()
 
 
 def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 4)
     page.page.click("#tab-deliver")
-    page.page.click("#export")
     page.until(f"document.querySelector('{DIALOG} .frames')")
     warnings = page.page.locator(f"{DIALOG} .with-warnings li")
     assert warnings.count() > len(page.view["warnings"]), "also the one that the verdict says"
@@ -322,7 +334,6 @@ def test_a_contradictory_calibration_is_saved_only_after_a_tick(page: Driver, tr
     page.load_sample({**truth, "placements": halved})
     assert page.view["verdict"]["level"] == "contradictory"
     page.page.click("#tab-deliver")
-    page.page.click("#export")
     choose(page, "tf2")
     expect(page.page.locator(f"{DIALOG} .first")).to_be_disabled()
     page.page.check(f"{DIALOG} .despite input")
@@ -334,7 +345,6 @@ def test_the_panel_fits_the_screen(solved: Driver) -> None:
     for width, height in ((1280, 720), (390, 844)):
         solved.page.set_viewport_size({"width": width, "height": height})
         solved.page.click("#tab-deliver")
-        solved.page.click("#export")
         choose(solved, "tf2")
         radar = solved.page.locator(f'{DIALOG} [data-field="radar_frame"]')
         usual = radar.input_value()
@@ -349,8 +359,6 @@ def test_the_panel_fits_the_screen(solved: Driver) -> None:
             choose(solved, name)
             nothing_spills(solved)
         expect(solved.page.locator(f"{DIALOG} .first")).to_be_in_viewport()
-        solved.page.keyboard.press("Escape")
-        expect(solved.page.locator(DIALOG)).to_be_hidden()
 
 
 def nothing_spills(page: Driver) -> None:

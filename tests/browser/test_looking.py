@@ -22,9 +22,10 @@ def test_the_page_says_what_was_found_and_that_nothing_can_be_clicked(page: Driv
     assert re.match(r"\d+ placements found, [\d.]+ to", page.text("#status-text"))
     assert "nothing can be clicked" in page.text("#warnings")
     assert "Add the camera's file" in page.text("#warnings")
-    for name in ("undo", "redo", "export"):
+    for name in ("undo", "redo"):
         assert page.page.is_disabled(f"#{name}")
     assert not page.page.is_visible("#tab-check")
+    assert not page.page.is_visible("#tab-deliver")
     assert not page.page.is_visible("#marks")
 
 

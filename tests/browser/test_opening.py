@@ -80,7 +80,7 @@ def test_the_first_image_is_there_and_nothing_can_be_done_to_it_until_the_record
         ):
             page.page.keyboard.press(key)
         assert page.value("__cocalib.unconfirmed() + __cocalib.clicks().length") == 0
-        assert not page.page.is_visible("#export-dialog")
+        assert not page.page.is_visible("#page-deliver")
         assert page.page.is_disabled("#play")
         server.admit(workspace, sample)
         for each in (page, second):

@@ -44,15 +44,15 @@ def test_the_export_panel_downloads_the_report_of_the_answer_on_the_page(
     page: Driver, workspace: Workspace, project_root: Path, tmp_path: Path
 ) -> None:
     page.page.click("#tab-deliver")
-    page.page.click("#export")
-    page.page.click('#export-dialog [data-export="report"]')
-    expect(page.page.locator("#export-dialog .reason")).to_contain_text("four placements")
+    page.page.click('#page-deliver [data-export="report"]')
+    expect(page.page.locator("#page-deliver .reason")).to_contain_text("four placements")
     workspace.import_clicks((project_root / "sample_data/rooftop/clicks.json").read_text(), "clicks.json")
     page.until("__cocalib.state.view.clicks.length > 4 && __cocalib.state.view.has_calibration")
     page.settle()
-    expect(page.page.locator("#export-dialog .text")).to_contain_text("Uncertainty in the image")
+    shown = page.page.frame_locator("#page-deliver .report")
+    expect(shown.locator("body")).to_contain_text("Mounting and its error")
     with page.page.expect_download() as download:
-        page.page.click("#export-dialog .first")
+        page.page.click("#page-deliver .first")
     assert download.value.suggested_filename == "report.html"
     download.value.save_as(tmp_path / "report.html")
     html = (tmp_path / "report.html").read_text(encoding="utf-8")

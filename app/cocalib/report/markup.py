@@ -17,7 +17,7 @@ _REPLACED = {"Cc", "Cs", "Cf", "Co", "Cn", "Zl", "Zp"}
 _KEPT_CONTROLS = "\n\t"
 _LONGEST = 600
 Child: TypeAlias = "Markup | str | None"
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def html_file(title: str, body: Markup) -> str:
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="generator", content=TAG),
         tag("title", title),

@@ -1,4 +1,4 @@
-"""What the export panel says: its formats and fields; of a file its numbers, their direction and the check point."""
+"""What the page Deliver says: its formats and fields; of a file its numbers, their direction and the check point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

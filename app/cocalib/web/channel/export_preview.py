@@ -1,4 +1,4 @@
-"""What the export panel shows of one format: the file's text, what its numbers mean, and the result of reading it back."""
+"""What the page Deliver shows of one format: the file's text, what its numbers mean, and the result of reading it back."""
 
 import re
 from dataclasses import dataclass, replace

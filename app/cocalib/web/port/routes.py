@@ -23,6 +23,7 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from calib_core.words.outcomes import in_sentences
 from cocalib.report.making import current_report
+from cocalib.report.markup import POLICY
 from cocalib.session.state import Session
 from cocalib.solving.solving import calibration_text
 from cocalib.view.wording import sentence
@@ -213,10 +214,18 @@ class _Downloads:
     def _calibration(self, _query: str) -> Reply:
         return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
 
-    def _report(self, _query: str) -> Reply:
-        return self._of_calibration(
-            lambda text: _download(current_report(text, self._recording).encode(), "report.html")
-        )
+    def _report(self, query: str) -> Reply:
+        """Return the report to keep, or to show in the page."""
+
+        def make(text: str) -> Reply:
+            report = current_report(text, self._recording).encode()
+            return (
+                _reply(report, _TYPES[".html"], policy=POLICY)
+                if query == "shown=1"
+                else _download(report, "report.html")
+            )
+
+        return self._of_calibration(make)
 
     def _export(self, name: str, query: str) -> Reply:
         def make(text: str) -> Reply:
