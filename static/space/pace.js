@@ -13,6 +13,8 @@
   const AWAKE = 3000;
   /** So often is drawn after that however long it takes: viser shows some of what arrives with the second drawing only. */
   const LEAST = 3;
+  /** What has arrived is drawn after this time, whatever is typed meanwhile [ms]. */
+  const LATEST = 500;
 
   const frame = window.requestAnimationFrame.bind(window);
   /** @type {Map<number, FrameRequestCallback>} */
@@ -23,10 +25,13 @@
   let coming = false;
   let woken = performance.now();
   let owed = LEAST;
+  /** Since when something waits to be drawn. */
+  let since = woken;
 
   /** Something has arrived, moved or changed size. */
   function wake() {
     woken = performance.now();
+    if (owed <= 0) since = woken;
     owed = LEAST;
     if (waiting.size) schedule();
   }
@@ -35,7 +40,7 @@
   function next(now) {
     const page = /** @type {{playing?: boolean, every?: number, holdUntil?: number}} */ (/** @type {any} */ (window.parent).cocalibPace ?? {});
     if (now - touched < TOUCH) return now;
-    return Math.max(drawn + (page.playing ? (page.every ?? PLAYING) : QUIET), page.holdUntil ?? 0);
+    return Math.max(drawn + (page.playing ? (page.every ?? PLAYING) : QUIET), Math.min(page.holdUntil ?? 0, since + LATEST));
   }
 
   /** Draw when it is time, with all callbacks in one frame; while nothing happens, they wait. */
@@ -52,7 +57,7 @@
   function draw(time) {
     coming = false;
     if (next(performance.now()) > performance.now()) return schedule();
-    drawn = performance.now();
+    drawn = since = performance.now();
     owed -= 1;
     const callbacks = [...waiting.values()];
     waiting.clear();

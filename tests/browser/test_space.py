@@ -50,6 +50,13 @@ def items(page: Driver, kind: str) -> list[dict[str, Any]]:
     return found
 
 
+def test_steady_input_does_not_keep_the_view_from_being_drawn(page: Driver) -> None:
+    page.value("void (cocalibPace.holdUntil = Infinity)")
+    page.until("__cocalibSpace.pickable().length > 0")
+    page.value("__cocalib.goTo(40)")
+    page.until(SETTLED)
+
+
 def open_views(page: Driver) -> None:
     """Show what the 3D view can be looked at from, and its colours."""
     page.value("document.querySelector('.over-space').open = true")
