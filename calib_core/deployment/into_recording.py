@@ -13,8 +13,8 @@ from calib_core.deployment.camera_info import ChosenTopic, InfoTemplate, choose_
 from calib_core.deployment.placing import SensorFrames, place_transform, read_frames
 from calib_core.errors import InputError, RecordingError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.formats.statement import statement
 from calib_core.interchange.own.calibration_json import write_calibration
+from calib_core.interchange.statement import statement
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
 from calib_core.radar import RadarErrors
 from calib_core.recordings import Recording

@@ -17,11 +17,11 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.rectification import maps_npz, rectified_camera, rectified_file
 from calib_core.interchange.format import Format, PoseFor, WrittenPose
 from calib_core.interchange.formats.registry import format_named, written_formats
-from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.formats.static_transform import ChildFrame, second_parent_notes, write_command, write_python
 from calib_core.interchange.formats.urdf import write_joint
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.raw_data import OtherPose, for_raw, other_pose
+from calib_core.interchange.statement import missing_map
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.interchange.trees.frame_tree import FrameTree

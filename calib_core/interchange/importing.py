@@ -21,10 +21,10 @@ from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.format import TRUTH_FORMAT, ImportedCalibration
 from calib_core.interchange.formats.registry import is_ours, reader_of, readers
-from calib_core.interchange.formats.statement import stated_origin
+from calib_core.interchange.statement import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.trees.frame_choice import WantedFrames
-from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration
+from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, calibration_of_joints
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
@@ -184,7 +184,7 @@ def _read(content: str | bytes, source: str, frames: WantedFrames, beside: Mappi
     for syntax in readings(content, source=source):
         reading = replace(syntax, beside=beside)
         reader = reader_of(reading)
-        chained = None if is_ours(reader) else chained_calibration(reading, frames, source=source)
+        chained = None if is_ours(reader) else calibration_of_joints(reading, frames, source=source)
         if chained is not None:
             return _with_origin(chained, reading)
         if reader is not None:

@@ -15,8 +15,8 @@ import pytest
 from calib_core.geometry import rotation_angle_rad
 from calib_core.interchange.exporting import export_all
 from calib_core.interchange.formats.registry import written_formats
-from calib_core.interchange.formats.statement import POSE_ONLY
 from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.statement import POSE_ONLY
 from cocalib.cli import demo
 from cocalib.cli.serving_flags import ServingFlags
 from cocalib.opening import Choice, Serving

@@ -123,7 +123,7 @@ def test_a_rig_is_read_as_its_other_readers_do(file, expected_m):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda rig: rig["rig"]["sensors"].pop(), "1 radars and 0 cameras"),
+        (lambda rig: rig["rig"]["sensors"].pop(), "'rig' is no camera by its name"),
         (
             lambda rig: rig["rig"]["sensors"][1].update(correction_sensor_T=[0, 0, 0.3]),
             "correction_sensor_T is not zero",

@@ -1,13 +1,14 @@
 """A format for the intrinsics of a camera, and what a reader finds in a file."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
 from calib_core.file_tag import TAG
+from calib_core.interchange.format import ImportedCalibration
 from calib_core.lens_models.registry import LENS_MODELS, lenses_named, opencv_lens
 
 
@@ -182,3 +183,19 @@ def refuse_skew(camera: Camera, whose: str) -> None:
     """
     if camera.matrix_px[0, 1] != 0.0:
         raise InputError(f"{whose} no skew, but this camera has; export with --to json or matlab instead")
+
+
+def with_camera(imported: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
+    """Return what was read with its camera; without an image size the camera is completed later, by `camera_for`.
+
+    Raises:
+        InputError: a parameter is invalid.
+    """
+    if camera is None:
+        return imported
+    if camera.size_px is not None:
+        return replace(imported, camera=camera.camera(image_size_px=None, source=source))
+    model, distortion = camera.lens(source=source)
+    return replace(
+        imported, matrix_px=np.reshape(camera.matrix_px, (3, 3)), lens_model=model, distortion=np.array(distortion)
+    )

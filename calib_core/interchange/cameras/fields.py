@@ -1,7 +1,7 @@
 """Find the cameras in a file's parsed values; ROS, OpenCV, Kalibr and CameraInfo each use their own keys."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -215,6 +215,17 @@ def floats(value: Any, *, source: str, place: str, length: int | None = None) ->
     if length is not None and len(flat) != length:
         raise InputError(f"{source}: {place}: expected {length} numbers, found {len(flat)}; correct it")
     return tuple(flat)
+
+
+def named_numbers(block: Any, keys: Sequence[str], *, source: str, place: str) -> tuple[float, ...]:
+    """Return the numbers under some keys of a mapping, in the order of the keys.
+
+    Raises:
+        InputError: it is no mapping, or a number is missing.
+    """
+    if not isinstance(block, Mapping):
+        raise InputError(f"{source}: {place}: missing; add it, with {', '.join(keys)}")
+    return tuple(floats(block.get(key), source=source, place=f"{place}.{key}", length=1)[0] for key in keys)
 
 
 def _number(value: Any, *, source: str, place: str) -> float:

@@ -1,25 +1,12 @@
 """Apollo's extrinsics: a stamped transform, which is also what `ros2 topic echo /tf_static` prints."""
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
-
-from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, posed_between
-from calib_core.interchange.formats.pose_parts import Ends, choose_transform
-from calib_core.interchange.formats.statement import (
-    POSE_ONLY,
-    hash_comment,
-    stated_check_point,
-    stated_frames,
-    statement,
-)
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
-from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.statement import POSE_ONLY, hash_comment, statement
 from calib_core.interchange.syntax.yaml_text import number_text, quoted
+from calib_core.interchange.trees.posed_in_tree import read_joints
+from calib_core.interchange.trees.stamped import recognizes_stamped
 
 
 def _write(file: CalibrationFile) -> str:
@@ -42,46 +29,6 @@ def _write(file: CalibrationFile) -> str:
     )
 
 
-def _recognizes(content: Content) -> bool:
-    return "child_frame_id" in content.mapping or "transforms" in content.mapping
-
-
-def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a stamped transform: Apollo's file, or what `ros2 topic echo /tf_static` prints.
-
-    Raises:
-        InputError: a frame name or a number is missing.
-    """
-    one, text = content.mapping, content.text
-    listed = one.get("transforms")
-    if isinstance(listed, list) and listed:
-        stamped = [entry if isinstance(entry, Mapping) else {} for entry in listed]
-        one = stamped[choose_transform([_ends(entry) for entry in stamped], stated_frames(text), source=source)]
-    header, transform = one.get("header"), one.get("transform")
-    if not isinstance(header, Mapping) or not isinstance(transform, Mapping):
-        raise InputError(f"{source}: a stamped transform needs header.frame_id, child_frame_id and transform; add them")
-    numbers = []
-    for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
-        block = transform.get(part)
-        if not isinstance(block, Mapping):
-            raise InputError(f"{source}: transform.{part}: missing; add it")
-        numbers.append([floats(block.get(k), source=source, place=f"transform.{part}.{k}", length=1)[0] for k in keys])
-    parent, child = str(header.get("frame_id") or ""), str(one.get("child_frame_id") or "")
-    if not parent or not child:
-        raise InputError(f"{source}: header.frame_id or child_frame_id is missing; name both frames")
-    written = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), "radar_from_camera")
-    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text), written)
-    return ImportedCalibration(
-        "apollo", roles.pose, frames=roles.frames, check_point=stated_check_point(text), assumptions=roles.assumptions
-    ).checked(source)
-
-
-def _ends(stamped: Mapping[str, Any]) -> Ends:
-    header = stamped.get("header")
-    parent = header.get("frame_id") if isinstance(header, Mapping) else ""
-    return Ends(str(parent or ""), str(stamped.get("child_frame_id") or ""))
-
-
 APOLLO = Format(
     name="apollo",
     title="Apollo extrinsics",
@@ -93,5 +40,5 @@ APOLLO = Format(
     comment="#",
     notes=(POSE_ONLY,),
     write=_write,
-    reads=Reads(_recognizes, _read),
+    reads=Reads(recognizes_stamped, read_joints),
 )

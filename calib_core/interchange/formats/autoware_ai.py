@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid_matrix, with_camera
+from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid_matrix
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "CameraExtrinsicMat"

@@ -4,7 +4,7 @@ from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.camera_format import refuse_skew
 from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.format import Format
-from calib_core.interchange.formats.statement import hash_comment, statement
+from calib_core.interchange.statement import hash_comment, statement
 
 _NUMBERS = "camera_matrix (K), distortion (D), rectification (R, identity) and projection (P); no pose"
 _NOTES = ("contains the camera only, without the pose: also export a format with the pose, such as tf2 or urdf",)

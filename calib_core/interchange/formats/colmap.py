@@ -10,7 +10,7 @@ from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.colmap import colmap_camera_line, found_colmap_camera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.statement import hash_comment, stated_frames, statement, with_statement
+from calib_core.interchange.statement import hash_comment, stated_frames, statement, with_statement
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.interchange.syntax.zip_archives import pack

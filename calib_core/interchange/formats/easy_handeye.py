@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.interchange.cameras.fields import named_numbers
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import between_named_frames, named_numbers
+from calib_core.interchange.formats.pose_parts import between_named_frames
 from calib_core.interchange.syntax.content import Content
 
 

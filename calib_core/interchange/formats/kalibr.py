@@ -9,8 +9,8 @@ from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.cameras.kalibr import kalibr_camera_text
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.rotations import upper_rows
+from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 

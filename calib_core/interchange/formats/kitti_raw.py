@@ -7,10 +7,10 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import rigid, with_camera
+from calib_core.interchange.formats.pose_parts import rigid
 from calib_core.interchange.syntax.content import Content
 
 _CAMERAS = "calib_cam_to_cam.txt"

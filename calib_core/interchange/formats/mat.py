@@ -9,8 +9,8 @@ from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
 from calib_core.interchange.cameras.matlab import ONE_BASED, dated_nothing
 from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.named_arrays import from_arrays
-from calib_core.interchange.formats.statement import STATEMENT_KEY, statement
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
+from calib_core.interchange.statement import STATEMENT_KEY, statement
 from calib_core.interchange.syntax.content import Content
 
 _NOTES = (

@@ -11,9 +11,9 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.format import ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
-from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, with_statement
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.rotations import upper_rows
+from calib_core.interchange.statement import STATEMENT_KEY, stated_lines, with_statement
 from calib_core.interchange.syntax.content import Content
 
 _ROUNDING = 1e-5

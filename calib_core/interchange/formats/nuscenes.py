@@ -12,7 +12,7 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.statement import (
+from calib_core.interchange.statement import (
     STATEMENT_KEY,
     stated_frames,
     stated_lines,

@@ -12,8 +12,8 @@ from calib_core.interchange.cameras.camera_format import refuse_skew
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.cameras.opencv import file_storage_matrix
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
-from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import quoted
 from calib_core.lens_models.registry import written_lens

@@ -8,10 +8,16 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose, looks_like_camera, looks_like_radar
-from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid, rigid_matrix, with_camera
+from calib_core.interchange.format import (
+    ImportedCalibration,
+    Reads,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+)
+from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid, rigid_matrix
 from calib_core.interchange.syntax.content import Content
 
 _ASSUMPTIONS = (

@@ -15,7 +15,7 @@ from calib_core.interchange.format import (
     looks_like_radar,
 )
 from calib_core.interchange.formats.pose_parts import AXES_ASSUMED, rigid_matrix
-from calib_core.interchange.formats.statement import (
+from calib_core.interchange.statement import (
     POSE_ONLY,
     STATEMENT_KEY,
     stated_check_point,

@@ -1,9 +1,5 @@
-"""What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, the
-transform to choose among several, a direction by facing.
-"""
+"""What files of other tools have in common: 4x4 matrices, roles by frame name, a direction by facing."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +8,6 @@ from numpy.typing import ArrayLike
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import (
     Direction,
@@ -30,17 +24,6 @@ AXES_ASSUMED = "assumed a radar frame with x forward, y left, z up, and a camera
 
 _LAST_ROW_ROUNDING = 1e-6
 _FACING = 0.5  # cosine of 60 degrees
-
-
-def named_numbers(block: Any, keys: Sequence[str], *, source: str, place: str) -> tuple[float, ...]:
-    """Return the numbers under some keys of a mapping, in the order of the keys.
-
-    Raises:
-        InputError: it is no mapping, or a number is missing.
-    """
-    if not isinstance(block, Mapping):
-        raise InputError(f"{source}: {place}: missing; add it, with {', '.join(keys)}")
-    return tuple(floats(block.get(key), source=source, place=f"{place}.{key}", length=1)[0] for key in keys)
 
 
 def rigid(form: Form, rotation: ArrayLike, translation_m: ArrayLike, *, source: str) -> RigidTransform:
@@ -117,60 +100,6 @@ def direction_by_facing(rotation: Matrix33) -> Direction | None:
     return fitting[0] if len(fitting) == 1 else None
 
 
-def with_camera(imported: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
-    """Return what was read with its camera; without an image size the camera is completed later, by `camera_for`.
-
-    Raises:
-        InputError: a parameter is invalid.
-    """
-    if camera is None:
-        return imported
-    if camera.size_px is not None:
-        return replace(imported, camera=camera.camera(image_size_px=None, source=source))
-    model, distortion = camera.lens(source=source)
-    return replace(
-        imported, matrix_px=np.reshape(camera.matrix_px, (3, 3)), lens_model=model, distortion=np.array(distortion)
-    )
-
-
 def pinhole_matrix(fx: float, fy: float, cx: float, cy: float) -> tuple[float, ...]:
     """Return the camera matrix, row by row, for focal lengths and principal point [px]."""
     return (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Ends:
-    """The two frames of a transform."""
-
-    parent: str
-    child: str
-
-
-def choose_transform(transforms: Sequence[Ends], stated: FrameNames | None, *, source: str) -> int:
-    """Return the index of the transform between the radar and the camera; a single one is taken as it is.
-
-    Args:
-        transforms: the frames of each, at least one.
-        stated: the frames that the file states in a comment, if it does.
-        source: the name of the file in error messages.
-
-    Raises:
-        InputError: of several, none is between a radar and a camera by its frame names, or more than one is.
-    """
-    if len(transforms) == 1:
-        return 0
-    fitting = [index for index, ends in enumerate(transforms) if _fits(ends, stated)]
-    if len(fitting) == 1:
-        return fitting[0]
-    named = ", ".join(f"{ends.parent} to {ends.child}" for ends in transforms[:6])
-    raise InputError(
-        f"{source}: contains {len(transforms)} transforms ({named}), {len(fitting)} of them between a radar and a camera by "
-        "name; keep only the intended one"
-    )
-
-
-def _fits(ends: Ends, stated: FrameNames | None) -> bool:
-    names = {ends.parent.lstrip("/"), ends.child.lstrip("/")}
-    if stated is not None:
-        return stated.radar in names and bool({stated.camera, stated.camera_link} & names)
-    return any(map(looks_like_radar, names)) and any(map(looks_like_camera, names))

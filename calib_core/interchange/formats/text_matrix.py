@@ -5,14 +5,14 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.statement import (
+from calib_core.interchange.rotations import upper_rows
+from calib_core.interchange.statement import (
     POSE_ONLY,
     hash_comment,
     stated_check_point,
     stated_frames,
     statement,
 )
-from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 

@@ -1,41 +1,18 @@
 """URDF: the camera's body frame in the radar frame, and the optical frame attached to it."""
 
-from dataclasses import replace
-from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
-from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import (
-    Format,
-    ImportedCalibration,
-    Reads,
-    WrittenPose,
-    looks_like_camera,
-    looks_like_radar,
-    posed_between,
-)
-from calib_core.interchange.formats.pose_parts import Ends, choose_transform
-from calib_core.interchange.formats.statement import (
-    POSE_ONLY,
-    stated_check_point,
-    stated_frames,
-    statement,
-    xml_comment,
-)
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.static_transform import ChildFrame, radar_from_child, second_parent_notes
-from calib_core.interchange.rotations import (
-    LINK_FROM_OPTICAL,
-    OPTICAL_RPY_RAD,
-    matrix_from_rpy,
-    rpy_from_matrix,
-)
-from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, OPTICAL_RPY_RAD, rpy_from_matrix
+from calib_core.interchange.statement import POSE_ONLY, statement, xml_comment
 from calib_core.interchange.syntax.yaml_text import numbers_text
+from calib_core.interchange.trees.posed_in_tree import read_joints
+from calib_core.interchange.trees.urdf import recognizes_urdf
 
 
 def _write(file: CalibrationFile) -> str:
@@ -87,79 +64,6 @@ def _joint(parent: str, child: str, parent_from_child: RigidTransform, rpy_rad: 
     )
 
 
-def _recognizes(content: Content) -> bool:
-    return content.root.tag == "robot"
-
-
-def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read the joint between radar and camera, and the optical joint attached to it, if there is one.
-
-    Raises:
-        InputError: no such joint, or it is not fixed.
-    """
-    joints = [joint for joint in content.root.iter("joint") if _ends(joint) != ("", "")]
-    stated = stated_frames(content.text)
-    between = [joint for joint in joints if _is_between(joint, stated)]
-    if not between:
-        raise InputError(
-            f"{source}: no joint between a radar and a camera in it; name its links accordingly, for example radar"
-        )
-    joint = between[choose_transform([Ends(*_ends(one)) for one in between], stated, source=source)]
-    if joint.get("type") != "fixed":
-        raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration needs a fixed joint")
-    parent, child = _ends(joint)
-    translation_m, rpy_rad = _origin(joint, source=source)
-    numbers = WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), "radar_from_camera")
-    roles = posed_between(parent, child, stated, numbers)
-    camera_end = child if roles.pose.direction == "radar_from_camera" else parent
-    optical = next((j for j in joints if _ends(j)[0] == camera_end and "optical" in _ends(j)[1]), None)
-    pose, frames, assumptions = roles.pose, roles.frames, roles.assumptions
-    if optical is not None:
-        _refuse_nonstandard_optical(optical, source=source)
-        pose, frames, assumptions = replace(pose, axes="link"), FrameNames(roles.frames.radar, _ends(optical)[1]), ()
-    return ImportedCalibration(
-        format="urdf",
-        pose=pose,
-        frames=frames,
-        check_point=stated_check_point(content.text),
-        assumptions=assumptions,
-    ).checked(source)
-
-
-def _ends(joint: Element) -> tuple[str, str]:
-    parent, child = joint.find("parent"), joint.find("child")
-    if parent is None or child is None:
-        return "", ""
-    return parent.get("link", ""), child.get("link", "")
-
-
-def _is_between(joint: Element, stated: FrameNames | None) -> bool:
-    names = _ends(joint)
-    if stated is not None:
-        return stated.radar in names
-    return any(map(looks_like_radar, names)) and any(map(looks_like_camera, names))
-
-
-def _origin(joint: Element, *, source: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    origin = joint.find("origin")
-    attributes = origin.attrib if origin is not None else {}
-    xyz, rpy = (
-        floats(attributes.get(key, "0 0 0").split(), source=source, place=f"origin {key}", length=3)
-        for key in ("xyz", "rpy")
-    )
-    return xyz, rpy
-
-
-def _refuse_nonstandard_optical(joint: Element, *, source: str) -> None:
-    translation_m, rpy_rad = _origin(joint, source=source)
-    rotation = matrix_from_rpy(np.array(rpy_rad))
-    if any(translation_m) or np.abs(rotation - LINK_FROM_OPTICAL.rotation).max() > 1e-4:
-        raise InputError(
-            f"{source}: the joint {joint.get('name')!r} is not the standard optical one (rpy -pi/2 0 -pi/2, no offset); "
-            "give the pose of the optical frame itself"
-        )
-
-
 URDF = Format(
     name="urdf",
     title="URDF: camera_link and optical frame",
@@ -172,5 +76,5 @@ URDF = Format(
     notes=(POSE_ONLY,),
     notes_on=second_parent_notes,
     write=_write,
-    reads=Reads(_recognizes, _read),
+    reads=Reads(recognizes_urdf, read_joints),
 )

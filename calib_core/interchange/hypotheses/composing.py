@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
-import numpy as np
-
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.format import (
     ImportedCalibration,
@@ -90,7 +88,7 @@ def _links(pose: FoundPose, file: UnstatedFile, sensors: list[Sensor]) -> Iterat
     target, source = ends
     lens, camera = file.beside.get(pose.place), next(filter(looks_like_camera, ends), None)
     if lens is not None and camera is not None:
-        sensors.append(Sensor(camera, "camera", None, np.reshape(lens.matrix_px, (3, 3))))
+        sensors.append(Sensor(camera, "camera", None, lens))
     place = Place(file.source if len(file.poses) == 1 else f"{file.source}, {pose.place}")
     yield _Link(target, source, RigidTransform(reading.turned.rotation, reading.translation), place)
 

@@ -16,13 +16,13 @@ from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.registry import reader_of
-from calib_core.interchange.formats.statement import stated_frames
 from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.hypotheses.finding import find_poses
 from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable, hints_of
 from calib_core.interchange.hypotheses.plain_values import array_of, plain_values
 from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of
 from calib_core.interchange.importing import read_any
+from calib_core.interchange.statement import stated_frames
 from calib_core.interchange.syntax.content import Content, readings
 
 _BARE = (MATRIX.reads, NUMPY, MATLAB.reads, OPENCV.reads)

@@ -12,8 +12,7 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import PlacedValue, placed_yaml
 from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, TreePart
 
-_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
-_ANGLES = {"roll", "pitch", "yaw"}
+POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 def recognizes_autoware(content: Content) -> bool:
@@ -22,9 +21,7 @@ def recognizes_autoware(content: Content) -> bool:
 
 
 def _is_parent(value: Any) -> bool:
-    return isinstance(value, Mapping) and any(
-        isinstance(entry, Mapping) and set(entry) >= _ANGLES for entry in value.values()
-    )
+    return isinstance(value, Mapping) and any(isinstance(entry, Mapping) and "yaw" in entry for entry in value.values())
 
 
 def read_autoware(text: str, source: str) -> TreePart:
@@ -46,8 +43,8 @@ def read_autoware(text: str, source: str) -> TreePart:
 
 def _joint(parent: str, child: str, entry: PlacedValue, text: str, source: str) -> Joint:
     place = Place(source, entry.line)
-    found = [entry.get(key) for key in _KEYS]
-    missing = [key for key, value in zip(_KEYS, found, strict=True) if value is None]
+    found = [entry.get(key) for key in POSE_KEYS]
+    missing = [key for key, value in zip(POSE_KEYS, found, strict=True) if value is None]
     if missing:
         raise InputError(f"{place}: {parent}.{child}: {', '.join(missing)} is missing; add it")
     values = [value for value in found if value is not None]

@@ -9,10 +9,12 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
+from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.format import Axes, Form, WrittenPose
+
+SensorKind = Literal["radar", "camera", "other"]
 
 _SAME = 1e-6
 
@@ -153,13 +155,13 @@ class Sensor:
         frame: its name.
         kind: which sensor.
         axes: of a camera's frame; None if the file does not say.
-        matrix_px: (3, 3) K of a camera whose image size the file does not state; None if it has none.
+        lens: of a camera; None if the file has none.
     """
 
     frame: str
-    kind: Literal["radar", "camera", "other"]
+    kind: SensorKind
     axes: Axes | None = None
-    matrix_px: Matrix33 | None = None
+    lens: FoundCamera | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +191,7 @@ class FrameTree:
         format: of the files; of several formats the first.
         hint: what may be missing from it, such as macros that were not expanded; "" if nothing.
         notes: what a user of it must know, one sentence each.
+        assumptions: what the files do not state and reading them takes for granted, one sentence each.
 
     Raises:
         InputError: a frame has two parents, or is its own ancestor.
@@ -199,6 +202,7 @@ class FrameTree:
     format: str = "tf2"
     hint: str = ""
     notes: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     _above: dict[str, Joint] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -317,6 +321,8 @@ class TreePart:
         sensors: what it says about sensors besides their pose.
         hint: what may be missing from it, such as macros that were not expanded; "" if nothing.
         notes: what a user of it must know, one sentence each.
+        assumptions: what it does not state and reading it takes for granted, one sentence each.
+        statement: what it states about itself in a key; "" if nothing.
     """
 
     format: str
@@ -324,6 +330,8 @@ class TreePart:
     sensors: tuple[Sensor, ...] = ()
     hint: str = ""
     notes: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    statement: str = ""
 
 
 def joined(parts: Sequence[TreePart]) -> FrameTree:
@@ -338,4 +346,5 @@ def joined(parts: Sequence[TreePart]) -> FrameTree:
         parts[0].format,
         "; ".join(part.hint for part in parts if part.hint),
         tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        tuple(dict.fromkeys(one for part in parts for one in part.assumptions)),
     )

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
@@ -94,10 +95,8 @@ def _sensor(record: Mapping[str, Any], frame: str, source: str) -> Sensor:
     intrinsic: Sequence[Any] = record.get("camera_intrinsic") or ()
     modality = str(record.get("modality") or ("camera" if intrinsic else "other"))
     if modality == "camera":
-        matrix = None
-        if intrinsic:
-            matrix = np.array(floats(intrinsic, source=source, place=f"{frame}: camera_intrinsic", length=9)).reshape(
-                3, 3
-            )
-        return Sensor(frame, "camera", "optical", matrix)
+        if not intrinsic:
+            return Sensor(frame, "camera", "optical")
+        matrix = floats(intrinsic, source=source, place=f"{frame}: camera_intrinsic", length=9)
+        return Sensor(frame, "camera", "optical", FoundCamera("camera_intrinsic", "pinhole", matrix, (), None))
     return Sensor(frame, "radar" if modality == "radar" else "other")

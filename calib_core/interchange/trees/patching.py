@@ -13,9 +13,9 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Form
-from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.own.raw_data import other_pose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
+from calib_core.interchange.statement import missing_map
 from calib_core.interchange.syntax.yaml_text import number_text
 from calib_core.interchange.trees.frame_choice import (
     ChosenFrames,

@@ -8,21 +8,21 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.cameras.camera_format import with_camera
 from calib_core.interchange.format import (
     Axes,
     ImportedCalibration,
-    StatedCheckPoint,
     WrittenPose,
     looks_like_lidar,
     of_lidar,
     posed_between,
 )
-from calib_core.interchange.formats.statement import stated_check_point, stated_frames
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
+from calib_core.interchange.statement import stated_check_point, stated_frames, with_statement
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place, Sensor, joined
-from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place, Sensor, Step, TreePart, joined
+from calib_core.interchange.trees.reading import tree_in
 from calib_core.parsing import json_value
 
 _STANDARD = 1e-4
@@ -37,36 +37,64 @@ class CameraAxes:
     assumptions: tuple[str, ...] = ()
 
 
-def chained_calibration(content: Content, frames: WantedFrames, *, source: str) -> ImportedCalibration | None:
-    """Return the pose between the radar and the camera of a file with several joints; None if it is no such file.
+def read_joints(content: Content, source: str) -> ImportedCalibration:
+    """Read a file with joints, as `calibration_of_joints`, if the user names no frames."""
+    found = calibration_of_joints(content, WantedFrames(), source=source)
+    if found is None:
+        raise InputError(f"{source}: no transform between two frames in it; give the file that has it")
+    return found
 
-    A file that states its two frames in a comment, as ours do, has its own reader, unless the user names others.
+
+def calibration_of_joints(content: Content, frames: WantedFrames, *, source: str) -> ImportedCalibration | None:
+    """Return the pose between the radar and the camera of a file with joints; None if it is no such file.
 
     Args:
         content: of the file.
-        frames: that the user names.
+        frames: that the user names; those that the file states come second, and the names of its frames last.
         source: the name of the file, for messages.
 
     Raises:
-        InputError: it is such a file, and the pose cannot be found in it; the message says what to do.
+        InputError: the pose cannot be found in it; the message says what to do.
     """
-    stated, below = stated_frames(content.text), stated_joint(content.text, source)
-    if not frames.is_given and below is None and (stated is not None or not may_have_several_joints(content)):
-        return None
     part = tree_in(content, content.text, source)
-    if part is not None and not part.joints and part.hint:
-        raise InputError(f"{source}: no joint in it that can be read; {part.hint}")
-    if part is None or not part.joints or (len(part.joints) < 2 and below is None and not frames.is_given):
+    if part is None:
         return None
-    if below is not None and stated is not None:
-        sensor = Sensor(stated.camera, "camera", "optical")
-        part = replace(part, joints=(*part.joints, below), sensors=(*part.sensors, sensor))
-        frames = WantedFrames(frames.radar or stated.radar, frames.camera or stated.camera)
-    return calibration_in_tree(joined([part]), frames, source=source, check_point=stated_check_point(content.text))
+    if not part.joints:
+        raise InputError(
+            f"{source}: no joint in it that can be read; {part.hint or 'give the file with the transforms'}"
+        )
+    text = part.statement or content.text
+    stated, below = stated_frames(text), stated_joint(text, source)
+    if len(part.joints) == 1 and below is None and not frames.is_given:
+        found = _of_one_joint(part, stated)
+    else:
+        joints = (*part.joints, below) if below is not None else part.joints
+        found = calibration_in_tree(joined([replace(part, joints=joints)]), frames, source=source, stated=stated)
+    found = replace(found, check_point=stated_check_point(text)).checked(source)
+    return with_statement(found, text) if part.statement else found
+
+
+def _of_one_joint(part: TreePart, stated: FrameNames | None) -> ImportedCalibration:
+    """Return the pose of the only joint of a file, whose two frames are the radar's and the camera's."""
+    joint = part.joints[0]
+    moved = joint.transform  # says why it cannot be used
+    written = joint.written or WrittenPose("matrix", moved.rotation, moved.translation_m, "radar_from_camera")
+    camera = next((one for one in part.sensors if one.kind == "camera" and one.axes == "optical"), None)
+    if stated is None and camera is not None and camera.frame in (joint.parent, joint.child):
+        stated = FrameNames(joint.parent if camera.frame == joint.child else joint.child, camera.frame)
+    roles = posed_between(joint.parent, joint.child, stated, written)
+    found = ImportedCalibration(
+        part.format,
+        roles.pose,
+        frames=roles.frames,
+        assumptions=(*roles.assumptions, *part.assumptions),
+        notes=part.notes,
+    )
+    return with_camera(found, camera.lens if camera is not None else None, source=joint.place.source)
 
 
 def calibration_in_tree(
-    tree: FrameTree, wanted: WantedFrames, *, source: str, check_point: StatedCheckPoint | None = None
+    tree: FrameTree, wanted: WantedFrames, *, source: str, stated: FrameNames | None = None
 ) -> ImportedCalibration:
     """Return the pose between the radar and the camera of a tree.
 
@@ -74,29 +102,48 @@ def calibration_in_tree(
         tree: of the files.
         wanted: the frames that the user names.
         source: the name of the files, for messages.
-        check_point: that the files state.
+        stated: the frames that the file states, for those that the user does not name.
 
     Raises:
         InputError: the frames cannot be chosen or chained; the message says what to do.
     """
+    ends = [name for name in (stated.camera, stated.camera_link) if name in tree.frames] if stated is not None else []
+    if stated is not None and ends and stated.radar in tree.frames:
+        known = Sensor(stated.camera, "camera", "optical"), Sensor(stated.camera_link, "camera", "link")
+        tree = replace(tree, sensors=(*known, *tree.sensors))
+        wanted = WantedFrames(wanted.radar or stated.radar, wanted.camera or ends[0])
     chosen = choose_frames(tree, wanted, source=source)
+    is_stated = stated is not None and (chosen.radar, chosen.camera) == (stated.radar, *ends[:1])
     try:
-        pose, used = _pose(tree, chosen.radar, chosen.camera)
-        known = axes_of_camera(tree, chosen)
-        frames = FrameNames(chosen.radar, known.optical_frame)
+        found = _between_chosen(tree, chosen, is_chained_note=not is_stated)
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(source) else f"{source}: {error}") from None
     sensor = tree.sensor_at(chosen.camera)
-    way = f"chained over {len(used)} joints: {'; '.join(map(str, used))}" if len(used) > 1 else ""
+    found = with_camera(found, sensor.lens if sensor is not None else None, source=source)
+    return (replace(found, frames=stated) if is_stated else found).checked(source)
+
+
+def _between_chosen(tree: FrameTree, chosen: ChosenFrames, *, is_chained_note: bool) -> ImportedCalibration:
+    pose, used = _pose(tree, chosen.radar, chosen.camera)
+    known = axes_of_camera(tree, chosen)
+    lidar = (of_lidar(chosen.radar),) if looks_like_lidar(chosen.radar) else ()
+    way = f"chained over {len(used)} joints: {'; '.join(str(step.joint) for step in used)}"
     return ImportedCalibration(
         tree.format,
         pose if known.axes == "optical" else replace(pose, axes="link"),
-        frames=frames,
-        check_point=check_point,
-        assumptions=(*((of_lidar(chosen.radar),) if looks_like_lidar(chosen.radar) else ()), *known.assumptions),
-        notes=tuple(note for note in (*chosen.notes, way, *tree.notes) if note),
-        matrix_px=sensor.matrix_px if sensor is not None else None,
-    ).checked(source)
+        frames=FrameNames(chosen.radar, known.optical_frame),
+        assumptions=(*lidar, *known.assumptions, *tree.assumptions),
+        notes=(*chosen.notes, *((way,) if len(used) > 1 and is_chained_note else ()), *tree.notes),
+        in_third_frame=_in_third_frame(used),
+    )
+
+
+def _in_third_frame(used: tuple[Step, ...]) -> tuple[WrittenPose, WrittenPose] | None:
+    """Return the poses of radar and camera if the joints are those of the two in one frame."""
+    if [step.down for step in used] != [False, True]:
+        return None
+    radar, camera = (step.joint.written for step in used)
+    return (radar, camera) if radar is not None and camera is not None else None
 
 
 def axes_of_camera(tree: FrameTree, chosen: ChosenFrames) -> CameraAxes:
@@ -125,24 +172,21 @@ def _numbers(tree: FrameTree, chosen: ChosenFrames) -> WrittenPose:
     return WrittenPose("matrix", between.rotation, between.translation_m, "radar_from_camera")
 
 
-def _pose(tree: FrameTree, radar: str, camera: str) -> tuple[WrittenPose, tuple[Joint, ...]]:
-    """Return the pose as written if one joint gives it, otherwise the product of the joints; and the joints."""
-    steps = tree.path(radar, camera)
-    if not steps:
+def _pose(tree: FrameTree, radar: str, camera: str) -> tuple[WrittenPose, tuple[Step, ...]]:
+    """Return the pose as written if one joint gives it, otherwise the product of the joints; and the joints that turn or move."""
+    path = tree.path(radar, camera)
+    if not path:
         raise InputError(f"{radar} cannot be the frame of the radar and of the camera; name two frames")
-    joints = tuple(step.joint for step in steps)
-    for step in steps:
-        _ = step.transform  # says which joint cannot be used
+    steps = tuple(step for step in path if np.any(step.transform.as_matrix() != np.eye(4))) or path
     written = steps[0].joint.written
     if written is not None and len(steps) == 1:
-        return replace(written, direction="radar_from_camera" if steps[0].down else "camera_from_radar"), joints
-    if written is not None and len(steps) == 2 and steps[0].down and _is_standard(joints[1]):
-        return replace(written, direction="radar_from_camera", axes="link"), joints
+        return replace(written, direction="radar_from_camera" if steps[0].down else "camera_from_radar"), steps
+    if written is not None and len(steps) == 2 and steps[0].down and _is_standard(steps[1].joint):
+        return replace(written, direction="radar_from_camera", axes="link"), steps
     radar_from_camera = tree.between(radar, camera)
-    return (
-        WrittenPose("matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"),
-        joints,
-    )
+    return WrittenPose(
+        "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
+    ), steps
 
 
 def _is_standard(joint: Joint) -> bool:

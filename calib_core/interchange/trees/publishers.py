@@ -17,7 +17,7 @@ from calib_core.parsing import python_tree
 PUBLISHER = "static_transform_publisher"
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _WORD = re.compile(r"""(?:"[^"\n]*"|'[^'\n]*'|[^\s"'\\;&|])+""")
-_COMMAND_END = re.compile(r"(?<!\\)\r?\n|[;&|]|\Z")
+_REST_OF_COMMAND = re.compile(r"""(?:"[^"\n]*"|'[^'\n]*'|\\\r?\n|[^\n;&|])*""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,8 @@ class _Word:
 def recognizes_publishers(content: Content) -> bool:
     """Return whether a launch file, a script or a command runs a static_transform_publisher."""
     if content.syntax == "xml":
-        return content.root.tag == "launch" and PUBLISHER in content.text
-    return content.syntax == "lines" and any(PUBLISHER in line for line in content.lines)
+        return content.root.tag == "launch"
+    return content.syntax == "lines" and (PUBLISHER in content.text or "generate_launch_description" in content.text)
 
 
 def read_publishers(content: Content, text: str, source: str) -> TreePart:
@@ -58,7 +58,8 @@ def read_publishers(content: Content, text: str, source: str) -> TreePart:
         name, commands = "tf2-launch-py", list(_in_python(text, source))
     else:
         name, commands = "tf2", list(_in_script(text))
-    return TreePart(name, tuple(_joint(words, source) for words in commands if words))
+    joints = tuple(_joint(words, source) for words in commands if words)
+    return TreePart(name, joints, hint="" if joints else f"it runs no {PUBLISHER} with arguments written out")
 
 
 def _in_script(text: str) -> Iterator[list[_Word]]:
@@ -66,8 +67,8 @@ def _in_script(text: str) -> Iterator[list[_Word]]:
         line_start = text.rfind("\n", 0, match.start()) + 1
         if text[line_start:].lstrip().startswith("#"):
             continue
-        end = _COMMAND_END.search(text, match.end())
-        yield list(_words(text, match.end(), end.start() if end else len(text)))
+        rest = _REST_OF_COMMAND.match(text, match.end())
+        yield list(_words(text, match.end(), rest.end() if rest else len(text)))
 
 
 def _words(text: str, start: int, end: int) -> Iterator[_Word]:
@@ -106,7 +107,8 @@ def _in_python(text: str, source: str) -> Iterator[list[_Word]]:
             continue
         given = {keyword.arg: keyword.value for keyword in call.keywords}
         program, arguments = given.get("executable", given.get("node_executable")), given.get("arguments")
-        if isinstance(program, ast.Constant) and program.value == PUBLISHER and isinstance(arguments, ast.List):
+        runs_it = program is None or (isinstance(program, ast.Constant) and program.value == PUBLISHER)
+        if runs_it and isinstance(arguments, ast.List):
             yield [_constant(item, lines, starts, source) for item in arguments.elts]
 
 

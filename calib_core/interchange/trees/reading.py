@@ -7,11 +7,11 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
 from calib_core.interchange.trees.autoware import read_autoware, recognizes_autoware
-from calib_core.interchange.trees.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
-from calib_core.interchange.trees.foxglove import has_several_transforms, read_foxglove, recognizes_foxglove
+from calib_core.interchange.trees.driveworks import read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.foxglove import read_foxglove, recognizes_foxglove
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor, TreePart, joined
 from calib_core.interchange.trees.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
-from calib_core.interchange.trees.publishers import PUBLISHER, read_publishers, recognizes_publishers
+from calib_core.interchange.trees.publishers import read_publishers, recognizes_publishers
 from calib_core.interchange.trees.stamped import read_stamped, recognizes_stamped
 from calib_core.interchange.trees.urdf import read_urdf, recognizes_urdf
 
@@ -59,19 +59,6 @@ def tree_in(content: Content, text: str, source: str) -> TreePart | None:
     if recognizes_poses(content) and len(content.value) > 2:
         return next(_posed_by_tables([(content, source)], {}))
     return None
-
-
-def may_have_several_joints(content: Content) -> bool:
-    """Return whether a file may contain more than one joint, judged without reading it."""
-    if recognizes_publishers(content):
-        return content.text.count(PUBLISHER) > 1
-    if recognizes_driveworks(content):
-        return not has_one_of_each(content)
-    if recognizes_foxglove(content):
-        return has_several_transforms(content)
-    if recognizes_stamped(content):
-        return len(content.documents) > 1 or len(content.mapping.get("transforms") or ()) > 1
-    return True
 
 
 def read_tree(files: Sequence[TreeFile]) -> FrameTree:

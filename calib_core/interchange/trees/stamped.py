@@ -27,7 +27,7 @@ def _is_stamped(value: Any) -> bool:
     listed = value.get("transforms")
     if isinstance(listed, list):
         return not any(isinstance(one, dict) and "parent_frame_id" in one for one in listed)
-    return "child_frame_id" in value and "parent_frame_id" not in value
+    return "child_frame_id" in value and ("header" in value or "transform" in value)
 
 
 def read_stamped(text: str, source: str) -> TreePart:

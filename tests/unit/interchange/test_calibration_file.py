@@ -30,7 +30,6 @@ from calib_core.interchange.check.report import check
 from calib_core.interchange.exporting import contents_text, export
 from calib_core.interchange.format import imported
 from calib_core.interchange.formats.registry import FORMATS
-from calib_core.interchange.formats.statement import statement
 from calib_core.interchange.importing import adopt, read_any
 from calib_core.interchange.own.calibration_json import (
     calibration_file,
@@ -40,6 +39,7 @@ from calib_core.interchange.own.calibration_json import (
 )
 from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.own.raw_data import aed_either_way, for_raw, other_pose
+from calib_core.interchange.statement import statement
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian

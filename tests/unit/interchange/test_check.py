@@ -204,18 +204,18 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 2\n", "the last row of the matrix is 0 0 0 2, not 0 0 0 1"),
         ("1 0 0 0\n0 2 0 0\n0 0 1 0\n", "not orthonormal"),
         ("ros2 run tf2_ros static_transform_publisher --x 1\n", "a frame's name is missing"),
-        ("ros2 run tf2_ros static_transform_publisher 1 2 3\n", "no static_transform_publisher with a pose"),
+        ("ros2 run tf2_ros static_transform_publisher 1 2 3\n", "expected 6 or 7 numbers and two frames"),
         ("static_transform_publisher --qx 1 --qy 1 --frame-id radar --child-frame-id cam", "has length 1.732, not 1"),
-        ("static_transform_publisher --x inf --frame-id radar --child-frame-id cam", "'inf' is not a valid number"),
-        ("<launch/>", "no <node> that runs static_transform_publisher"),
-        ("<robot/>", "no joint between a radar and a camera"),
+        ("static_transform_publisher --x inf --frame-id radar --child-frame-id cam", "'inf' is not a number"),
+        ("<launch/>", "it runs no static_transform_publisher"),
+        ("<robot/>", "no joint in it that can be read"),
         ("<html/>", "expected OpenCV's <opencv_storage>"),
         ("def generate_launch_description(): return [", "not Python"),
-        ("def generate_launch_description(): return []", "no arguments"),
+        ("def generate_launch_description(): return []", "it runs no static_transform_publisher"),
         ("Tr_velo_to_cam: 1 2 3\n", "Tr_velo_to_cam: expected 12 numbers, found 3"),
         ('{"parent_frame_id": "radar"}', "parent_frame_id or child_frame_id is missing"),
-        ('{"FrameTransform": 3}', "parent_frame_id or child_frame_id is missing"),
-        ("child_frame_id: camera\n", "a stamped transform needs header.frame_id"),
+        ('{"FrameTransform": 3}', "found FrameTransform"),
+        ("child_frame_id: camera\nheader: {}\n", "a stamped transform needs header.frame_id"),
         ("R: [1, 0, 0]\nT: [0, 0, 0]\n", "R: expected 9 numbers, found 3"),
     ],
 )
@@ -223,7 +223,7 @@ def test_content_without_a_valid_calibration_is_refused_in_one_line(content, wor
     with pytest.raises(InputError, match=words) as refusal:
         read_any(content, "file")
 
-    assert str(refusal.value).startswith("file: ")
+    assert str(refusal.value).startswith("file:")
     assert "\n" not in str(refusal.value)
 
 

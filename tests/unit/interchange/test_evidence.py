@@ -16,9 +16,9 @@ from calib_core.interchange.check.report import check
 from calib_core.interchange.exporting import export
 from calib_core.interchange.format import Format, ImportedCalibration, imported
 from calib_core.interchange.formats.registry import FORMATS, format_named
-from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.importing import adopt, adoption, read_any
 from calib_core.interchange.own.calibration_json import calibration_sha256, read_calibration, write_calibration
+from calib_core.interchange.statement import stated_origin
 
 
 def text_of(file: CalibrationFile, name: str) -> str:

@@ -33,7 +33,7 @@ ECHO = "At time 0.0\n- Translation: [{}]\n- Rotation: in Quaternion [{}]\n"
 def refusal(content: str | dict[str, Any]) -> str:
     with pytest.raises(InputError) as refused:
         read_any(content if isinstance(content, str) else json.dumps(content), "file")
-    assert str(refused.value).startswith("file: ")
+    assert str(refused.value).startswith("file:")
     return str(refused.value)
 
 

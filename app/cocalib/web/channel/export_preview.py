@@ -10,8 +10,8 @@ from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.exporting import Export, contents_text, export, posed
 from calib_core.interchange.format import PoseFor, imported
 from calib_core.interchange.formats.registry import format_named
-from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.importing import read_any
+from calib_core.interchange.statement import missing_map
 from cocalib.view.model import WarningRow, warning_row
 from cocalib.view.wording import sentence
 from cocalib.web.exports import (

@@ -175,7 +175,7 @@ def test_a_rig_of_many_sensors_is_chained_with_body_axes():
     corrected = read_any(rig, "rig.json", WantedFrames("right"))
     radar = pose((3.02, -0.5, 0.01, 0, 0, -4), degrees=True) @ pose((0, 0, 0, 0.1, 2, 0), degrees=True)
     np.testing.assert_allclose(corrected.camera_from_radar.as_matrix(), np.linalg.inv(camera) @ radar, **CLOSE)
-    assert "how corrections apply" in " ".join(corrected.notes)
+    assert "how corrections apply" in " ".join(corrected.assumptions)
     with pytest.raises(InputError, match=r"rig.json:6: the joint from rig to odd .*: correction_other is not zero"):
         read_any(rig, "rig.json", WantedFrames("odd"))
 
