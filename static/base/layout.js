@@ -37,6 +37,10 @@ export function startLayout() {
   for (const bar of dividers()) for (const type of ["keyup", "pointerup", "focus"]) bar.addEventListener(type, tellDividers);
   for (const tab of tabs()) tab.onclick = () => showPage(nameOf(tab));
   element("menu").addEventListener("click", () => element("menu").hidePopover());
+  element("menu").addEventListener("toggle", (event) => {
+    const closed = /** @type {ToggleEvent} */ (event).newState === "closed";
+    if (closed && document.activeElement === element("menu-button")) element("image-pane").focus({ preventScroll: true }); // the next key is for the image
+  });
   document.getElementById("tabs")?.addEventListener("keydown", (event) => {
     const at = tabs().findIndex((tab) => tab === document.activeElement);
     const next = event.key === "ArrowRight" ? at + 1 : event.key === "ArrowLeft" ? at - 1 : -1;

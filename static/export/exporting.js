@@ -48,7 +48,8 @@ const retry = make("button", "second", "Try again");
 
 export function startExporting() {
   register(
-    { id: "export", group: "File", words: "Export the calibration, the report or the clicks", keys: ["E"], also: "deliver tab save download write file json yaml urdf tf format", run: openExport, when: withImages },
+    { id: "export", group: "File", words: "Export the calibration, the report or the clicks", keys: ["E"], also: "deliver tab save download write file json yaml urdf tf format", run: () => openExport(), when: withImages },
+    { id: "report", group: "File", words: "Show the accuracy report", also: "html pdf print quality colleague", run: () => openExport(REPORT), when: withImages },
     { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withImages },
   );
   try {
@@ -85,8 +86,11 @@ async function loadFormats() {
   drawList();
 }
 
-function openExport() {
+/** @param {string} [format] the one before if none is given */
+function openExport(format = kept.format) {
   drawn = "";
+  keep({ format });
+  drawList();
   showPage("deliver");
   focusFormats();
 }

@@ -20,6 +20,14 @@ export const withSelected = () => withImages() || (selectedClick() ? "" : "No pa
 const undoable = () => withImages() || (state.view?.can_undo ? "" : "There is nothing to undo");
 const redoable = () => withImages() || (state.view?.can_redo ? "" : "There is nothing to redo");
 
+/** Without a proposal: set the mark of the keyboard's cross, keep the return that is asked about, or go on. */
+function enter() {
+  const [cross, asked] = [state.cross, state.candidates];
+  if (cross) return enterCross(cross);
+  if (asked?.suggestion && selectedClick()?.frame === state.shown?.index) return choose(asked.rows.findIndex((row) => row.used));
+  if (!withPlacements()) toPlacement(1);
+}
+
 /** @param {number} du @param {number} dv image px */
 const nudge = (du, dv) => () => nudgeBy(du, dv);
 
@@ -35,7 +43,7 @@ export function registerImage() {
     { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward proposal", run: () => toPlacement(1), ...PLACES },
     { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => toPlacement(-1), ...PLACES },
 
-    { id: "place-mark", group: "Mark", words: "Accept, or mark with the keyboard", keys: ["Enter"], also: "click place add confirm yes", run: enterCross, when: withImages },
+    { id: "place-mark", group: "Mark", words: "Accept, keep the return that is shown, or go on", keys: ["Enter"], also: "click place add confirm yes mark", run: enter, when: withImages },
     { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withImages },
     { id: "next-candidate", group: "Mark", words: "Take another spot, or with a mark another return", keys: ["C"], also: "candidate choose radar association other next", run: nextCandidate, when: () => withImages() || withoutCandidates() },
     { id: "free-candidate", group: "Mark", words: "Automatic return", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withImages() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },

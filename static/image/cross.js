@@ -6,7 +6,6 @@
 import { ink, smallFont } from "../base/colours.js";
 import { addLayer } from "../base/layers.js";
 import { toast } from "../base/notices.js";
-import { offers } from "../base/offers.js";
 import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { leaveLive } from "../time/player.js";
 import { clamped, leaveCross, moveTo, place } from "./clicking.js";
@@ -34,7 +33,7 @@ let pace = { factor: 1, at: 0 };
 
 export function startCross() {
   addLayer("cross", drawCross);
-  on(["shown", "overlay", "playing", "proposals"], follow);
+  on(["shown", "overlay", "playing"], follow);
 }
 
 /** Show the cross, or hide it. */
@@ -50,11 +49,10 @@ function endCross() {
   leaveCross();
 }
 
-/** Another frame has its own cross; one that only Enter brought, and nobody moved, gives way to a proposal. */
+/** Another frame has its own cross. */
 function follow() {
   const cross = state.cross;
   if (state.playing) return leaveCross();
-  if (cross && !cross.touched && !wanted && offers.shown()) return leaveCross();
   if (cross && cross.frame !== state.shown?.index) leaveCross();
   if (cross && !cross.touched && !cross.expected && expectedHere()) return start();
   if (!state.cross && wanted && state.shown && !clicksIn(state.shown.index).length && placementsAt(state.shown.index).length) start();
@@ -148,13 +146,8 @@ function touch(cross, u, v) {
   cross.touched = true;
 }
 
-/** Enter: show the cross; where it is shown, set the mark. */
-export function enterCross() {
-  const cross = state.cross;
-  if (!cross) {
-    if (state.shown?.index === state.cursor && !state.playing) start();
-    return;
-  }
+/** Enter: set the mark where the cross is shown. @param {Cross} cross */
+export function enterCross(cross) {
   const here = clickIn(cross.frame);
   if (!cross.touched && !cross.expected) return toast("Move the cross to the reflector first: digits zoom in, arrows move it.");
   const mark = cross.touched ? "clicked" : "untouched";

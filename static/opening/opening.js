@@ -31,7 +31,7 @@ let busy = false;
 let waiting = [];
 
 export function startOpening() {
-  register({ id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording });
+  register({ id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open new session file folder recent camera radar topic intrinsics", run: chooseRecording });
   strip.id = "intrinsics-strip";
   strip.hidden = true;
   pane.append(strip);

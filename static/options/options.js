@@ -49,6 +49,8 @@ const LABELS = {
   "reflector.click_offset_sigma_px": "Click offset",
   "solving.sensors_above_placements": "Sensors above the placements",
 };
+/** Other words by which someone may look for an option. @type {Record<string, string>} */
+const ALSO = { "solving.camera_position": "tape measure ruler mounting", method: "paper algorithm 1 ransac" };
 /** Headings that say more than the group's name. @type {Record<string, string>} */
 const HEADINGS = {
   radar: "Radar: systematic errors, ± assumed",
@@ -150,59 +152,64 @@ function yesNo(field) {
   return row(field, make("span", "control", [input]));
 }
 
-/** Measured camera position: off, or three distances, and how they were measured or their standard deviation. @param {Field} field */
+/** Measured camera position: what it is, and the buttons to enter it or take it back. @param {Field} field */
 function cameraPosition(field) {
-  const enabled = make("input", "", []);
-  enabled.type = "checkbox";
-  enabled.id = idOf(field);
-  const names = ["forward", "left", "up"];
-  const inputs = names.map(() => number(-100, 100));
-  inputs.forEach((input, index) => {
-    input.dataset.hint = `Distance ${names[index]} from the radar to the camera [m]`;
+  const shown = make("span", "unit", "");
+  const enter = make("button", "second", "Enter…");
+  enter.id = idOf(field);
+  enter.onclick = () => askPosition(field);
+  const remove = make("button", "second", "Remove");
+  remove.onclick = () => change(field.path, null);
+  writers.set(field.path, (value) => {
+    remove.hidden = value === null;
+    shown.textContent = value === null ? "" : `${value.position_m.join(", ")} ± ${value.sigma_m} m`;
   });
-  const sigma = number(0.0001, 10);
-  sigma.dataset.hint = "Standard deviation of each of the three distances [m]";
+  return row(field, make("span", "control", [shown, enter, remove]));
+}
+
+const positionDialog = make("dialog", "options position", []);
+positionDialog.setAttribute("aria-label", "Camera position relative to the radar");
+document.body.append(positionDialog);
+
+/** Ask for the camera's position where the button is that has the focus: three distances, and how they were measured. @param {Field} field */
+function askPosition(field) {
+  const known = valueAt(/** @type {Record<string, any>} */ (state.view?.options), field.path);
+  const names = ["forward", "left", "up"];
+  const inputs = names.map((name, index) => {
+    const input = number(-100, 100);
+    input.required = true;
+    input.dataset.hint = `Distance ${name} from the radar to the camera [m]`;
+    input.value = String(known?.position_m[index] ?? "");
+    return input;
+  });
   const ways = Object.entries(field.measured);
   const how = make("select", "", [...ways.map(([words]) => words), "otherwise"].map((words) => make("option", "", words)));
-  how.id = `${idOf(field)}-how`;
   how.dataset.hint = "How the three distances were measured; this sets their standard deviation";
-  const named = [...inputs, sigma].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
-  const measured = make("label", "how", [make("span", "", "measured"), how]);
-  const numbers = make("span", "control triple", [...named, make("span", "unit", "m"), measured]);
-  numbers.setAttribute("role", "group");
-  numbers.setAttribute("aria-label", "Camera position relative to the radar");
-  const submit = () => {
-    const entered = [...inputs, sigma].every((input) => input.value !== "");
-    if (entered) change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sigma.value) });
-  };
-  enabled.onchange = () => {
-    numbers.hidden = !enabled.checked;
-    if (!enabled.checked) return change(field.path, null);
-    if (sigma.value === "") sigma.value = String(ways[0][1]);
-    inputs[0].focus();
-    submit();
-  };
-  for (const input of [...inputs, sigma]) input.onchange = submit;
-  how.onchange = () => {
-    const way = ways[how.selectedIndex];
-    if (way) sigma.value = String(way[1]);
-    submit();
-  };
-  writers.set(field.path, (value) => {
-    const entered = inputs.every((input) => input.value !== "");
-    if (value === null && enabled.checked && (!entered || numbers.contains(document.activeElement))) return; // the values are still being entered
-    enabled.checked = value !== null;
-    numbers.hidden = value === null;
-    if (value === null) return; // keep what was entered, in case it is enabled again
-    inputs.forEach((input, index) => write(input, value.position_m[index]));
-    write(sigma, value.sigma_m);
-    const way = ways.findIndex(([, sigmaM]) => sigmaM === value.sigma_m);
+  const sigma = number(0.0001, 10);
+  sigma.required = true;
+  sigma.dataset.hint = "Standard deviation of each of the three distances [m]";
+  sigma.value = String(known?.sigma_m ?? ways[0][1]);
+  const shownWay = () => {
+    const way = ways.findIndex(([, sigmaM]) => sigmaM === Number(sigma.value));
     how.selectedIndex = way < 0 ? ways.length : way;
-  });
-  const head = row(field, make("span", "control", [enabled]));
-  const box = make("div", "position", [head, numbers]);
-  box.dataset.field = field.path;
-  return box;
+  };
+  how.onchange = () => void (ways[how.selectedIndex] && (sigma.value = String(ways[how.selectedIndex][1])));
+  sigma.oninput = shownWay;
+  shownWay();
+  const use = make("button", "first", "Use it");
+  const fields = [...inputs, sigma].map((input, index) => make("label", "", [make("span", "", `${names[index] ?? "±"} [m]`), input]));
+  const form = make("form", "", [make("b", "", "Camera, seen from the radar"), make("div", "triple", fields), make("label", "how", ["measured", how]), use]);
+  form.onsubmit = (event) => {
+    event.preventDefault();
+    positionDialog.close();
+    change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sigma.value) });
+  };
+  const { left = 0, top = 0 } = document.activeElement?.getBoundingClientRect() ?? {};
+  positionDialog.replaceChildren(form);
+  positionDialog.showModal();
+  positionDialog.style.left = `${Math.max(8, Math.min(left, innerWidth - positionDialog.offsetWidth - 8))}px`;
+  positionDialog.style.top = `${Math.max(8, Math.min(top, innerHeight - positionDialog.offsetHeight - 8))}px`;
+  inputs[0].focus();
 }
 
 /** @param {number|null} low @param {number|null} high */
@@ -231,6 +238,9 @@ function row(field, content) {
   return line;
 }
 
+/** @param {string} path */
+const fieldAt = (path) => state.recording?.option_groups.flatMap((group) => group.options).find((field) => field.path === path);
+
 /** @param {Field} field */
 const labelOf = (field) => LABELS[field.path] ?? sentence(field.label);
 
@@ -248,7 +258,7 @@ function fill() {
   for (const [path, set] of writers) {
     const value = valueAt(options, path);
     set(value);
-    const field = state.recording?.option_groups.flatMap((group) => group.options).find((other) => other.path === path);
+    const field = fieldAt(path);
     const same = JSON.stringify(field?.default ?? null) === JSON.stringify(value ?? null);
     page.querySelector(`[data-path="${path}"]`)?.classList.toggle("changed", !same);
   }
@@ -261,25 +271,25 @@ export function optionRows() {
     const value = valueAt(options, field.path) ?? "off";
     const reason = IDLE[options.method]?.(field.path) ? `Not used by the method "${METHODS[options.method] ?? options.method}"` : "";
     const shown = typeof value === "object" ? "given" : typeof value === "boolean" ? (value ? "yes" : "no") : `${value} ${field.unit}`.trim();
-    return { path: field.path, label: labelOf(field), value: shown, reason, also: `option setting ${field.path.replaceAll(/[._]/g, " ")} ${field.label}` };
+    return { path: field.path, label: labelOf(field), value: shown, reason, also: `option setting ${field.path.replaceAll(/[._]/g, " ")} ${field.label} ${ALSO[field.path] ?? ""}` };
   });
 }
 
 /** Show an option in the panel, ready to be changed. @param {string} path */
 export function openOption(path) {
+  const position = fieldAt(path);
+  if (position?.kind === "camera-position") return askPosition(position);
   showPage("options");
   const line = /** @type {HTMLElement|null} */ (page.querySelector(`[data-field="${path}"]`));
   const folded = line?.closest("details");
   if (folded) folded.open = true;
   line?.scrollIntoView({ block: "center" });
-  const box = /** @type {HTMLInputElement|null|undefined} */ (line?.classList.contains("position") ? line.querySelector("input[type=checkbox]") : null);
-  if (box && !box.checked) return box.click(); // its fields appear, and the first has the focus
   /** @type {HTMLElement|null|undefined} */ (line?.querySelector("input, select, button"))?.focus();
 }
 
 /** @param {string} path */
 function optionLabel(path) {
-  const field = (state.recording?.option_groups ?? []).flatMap((group) => group.options).find((one) => one.path === path);
+  const field = fieldAt(path);
   return field ? labelOf(field) : "The option";
 }
 

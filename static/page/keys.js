@@ -6,7 +6,6 @@
 import { act, ACTIONS } from "../base/actions.js";
 import { state } from "../base/state.js";
 import { crossTakes } from "../image/cross.js";
-import { shownOffer } from "../proposals/proposals.js";
 
 /** Keys that stay with the page even where a field has the focus. */
 const ANYWHERE = ["Ctrl+K"];
@@ -48,7 +47,7 @@ function typing(event) {
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
   if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
-  if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play") && !(event.key === "Enter" && target === pointed.target && shownOffer());
+  if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play") && !(event.key === "Enter" && target === pointed.target);
   if (target.dataset.roves?.split(" ").includes(event.key)) return !event.altKey;
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }

@@ -13,8 +13,6 @@ const MOST_RECENT = 6;
 const MOST_ROWS = 90;
 /** How much better a recent entry fits, in the scale of searching.js. */
 const RECENT = 0.5;
-/** How much worse one fits that cannot be done now. */
-const DISABLED = 1;
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("palette"));
 const field = make("input", "", []);
 const list = make("div", "found", []);
@@ -68,19 +66,21 @@ function found() {
   }
   const ranked = [...actions(), ...places()].flatMap((entry) => {
     const fit = fitOf(query, entry);
-    return fit ? [{ entry, fit: fit + (recent.includes(entry.id) ? RECENT : 0) - (entry.reason ? DISABLED : 0) }] : [];
+    return fit ? [{ entry, fit: fit + (recent.includes(entry.id) ? RECENT : 0) }] : [];
   });
   ranked.sort((a, b) => b.fit - a.fit);
   return [...typedPlaces(query), ...ranked.map(({ entry }) => entry)];
 }
 
+/** What is said if nothing can be done: why not what fits best. @param {Entry|undefined} best */
+const nothing = (best) => (best ? `${best.words}: ${best.reason}.` : "Nothing found. Try another word, such as zoom, outlier, colour or save.");
+
 function draw() {
-  rows = found();
-  const shown = rows.slice(0, MOST_ROWS);
-  list.replaceChildren(...shown.map(line));
+  const all = found();
+  rows = all.filter((entry) => !entry.reason).slice(0, MOST_ROWS);
+  list.replaceChildren(...rows.map(line));
   list.hidden = rows.length === 0;
-  said.textContent = rows.length ? "" : "Nothing found. Try another word, such as zoom, outlier, colour or save.";
-  rows = shown;
+  said.textContent = rows.length ? "" : nothing(all[0]);
   chosen = -1;
   choose(rows.length ? 0 : -1);
 }
@@ -89,7 +89,7 @@ function draw() {
 function line(entry, index) {
   const keys = (entry.keys ?? []).slice(0, 1).flatMap(keyNames).map((name) => make("kbd", "key", name));
   const box = make("div", "entry", [
-    make("span", "words", [entry.words, make("small", "", entry.reason || entry.detail || "")]),
+    make("span", "words", [entry.words, make("small", "", entry.detail || "")]),
     make("span", "group", entry.group),
     make("span", "keys", keys),
   ]);
@@ -97,7 +97,6 @@ function line(entry, index) {
   box.dataset.entry = entry.id;
   box.setAttribute("role", "option");
   box.setAttribute("aria-selected", "false");
-  box.setAttribute("aria-disabled", String(entry.reason !== ""));
   return box;
 }
 
@@ -141,10 +140,10 @@ function clicked(event) {
   run(indexOf(event.target));
 }
 
-/** Do what a row says; one that cannot be done stays, with its reason. @param {number} index */
+/** Do what a row says. @param {number} index */
 function run(index) {
   const entry = rows[index];
-  if (!entry || entry.reason) return;
+  if (!entry) return;
   dialog.close();
   remember(entry.id);
   entry.run();

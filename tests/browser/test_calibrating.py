@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import expect
 
 from tests.browser.driving import Driver
 
@@ -158,24 +159,24 @@ def test_a_camera_position_is_used_only_once_it_is_entered(page: Driver, truth: 
     without = page.view
     page.page.click("#menu-button")
     page.page.click('#menu [data-action="options"]')
-    page.page.get_by_label("Measured camera position").check()
-    assert page.view["options"]["solving"]["camera_position"] is None
+    page.page.click("#option-solving-camera_position")
+    dialog = page.page.locator("dialog.position")
     rotation, translation = (np.array(truth["camera_from_radar"][key]) for key in ("rotation", "translation_m"))
-    for name, value in zip(("forward", "left", "up"), -rotation.T @ translation, strict=True):
-        page.page.get_by_label(name, exact=True).fill(f"{value:.3f}")
+    fields = dialog.locator("input")
+    expect(fields.first).to_be_focused()
+    for index, value in enumerate(-rotation.T @ translation):
+        fields.nth(index).fill(f"{value:.3f}")
     page.page.keyboard.press("Enter")
     page.until("__cocalib.state.view.options.solving.camera_position !== null")
     page.settle()
     assert page.view["options"]["solving"]["camera_position"]["sigma_m"] == 0.03
-    page.page.locator("#option-solving-camera_position-how").select_option("from the antennas to the lens")
+    page.page.click("#option-solving-camera_position")
+    dialog.locator("select").select_option("from the antennas to the lens")
+    page.page.click("dialog.position .first")
     page.until("__cocalib.state.view.options.solving.camera_position.sigma_m === 0.02")
+    page.settle()
     assert page.view["pose"] != without["pose"]
-    page.page.locator("#option-solving-camera_position").uncheck()
+    page.page.click('[data-path="solving.camera_position"] button:has-text("Remove")')
     page.until("__cocalib.state.view.options.solving.camera_position === null")
     page.settle()
     assert page.view["pose"] == without["pose"]
-    assert page.page.get_by_label("up", exact=True).is_hidden()
-    page.page.locator("#option-solving-camera_position").check()
-    page.until("__cocalib.state.view.options.solving.camera_position !== null")
-    page.settle()
-    assert page.page.get_by_label("left", exact=True).input_value() != ""

@@ -77,7 +77,7 @@ def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any
 
 def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.shown.index === __cocalib.state.placements?.[0]?.frame")
-    page.press("Enter", "Enter")
+    page.press("g", "Enter")
     assert page.view["clicks"] == [], "nothing is expected yet, and the cross was not moved"
     page.press("ArrowRight", "Enter")
     [first] = page.view["clicks"]
@@ -93,11 +93,21 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
     page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
     guess, _ = page.value("__cocalib.state.overlay.guesses[0]")
-    page.press("Enter", "Enter")
+    page.press("Enter")
     assert len(page.view["clicks"]) == 9
     last = page.view["clicks"][-1]
     assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
     assert last["state"] == "untouched"
+
+
+def test_enter_opens_neither_the_cross_nor_the_menu_again(page: Driver) -> None:
+    page.press("Enter")
+    page.page.click("#menu-button")
+    page.page.click("#theme")
+    page.press("Enter")
+    assert not page.value("__cocalib.state.cross")
+    assert not page.page.is_visible("#menu")
+    assert page.view["clicks"] == []
 
 
 def test_a_failure_of_the_papers_method_is_said_once(page: Driver, truth: Any) -> None:

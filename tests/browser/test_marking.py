@@ -38,7 +38,9 @@ def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any
         )
         if page.value("__cocalib.clicksIn(__cocalib.state.cursor).length"):
             break
-        page.press("Enter", "Enter")
+        if not page.value("__cocalib.state.cross"):
+            page.press("g")
+        page.press("Enter")
         guesses += page.value("__cocalib.clicksIn(__cocalib.state.cursor).length")
     rows = page.view["clicks"]
     assert [row["state"] for row in rows].count("untouched") == guesses >= 5

@@ -30,25 +30,24 @@ def opened(page: Driver) -> None:
 
 def test_the_palette_finds_actions_by_their_words_other_words_and_with_a_slip(page: Driver) -> None:
     opened(page)
-    assert found(page, "undo")[0] == "Undo"
-    row = page.page.locator("#palette .entry").first
-    expect(row).to_have_attribute("aria-disabled", "true")
-    expect(row).to_contain_text("There is nothing to undo")
-    page.page.keyboard.press("Enter")
-    expect(page.page.locator("#palette")).to_be_visible()
+    assert "Undo" not in found(page, "undo")
+    assert "Redo" not in found(page, "redo")
     for query, first in (
-        ("outlier", "Next worst pair"),
-        ("exprot", "Export the calibration or the clicks"),
+        ("exprot", "Export the calibration, the report or the clicks"),
+        ("tape", "Measured camera position"),
+        ("paper", "Method"),
+        ("report", "Show the accuracy report"),
+        ("new session", "Choose another recording, other topics, intrinsics or session"),
         ("colours", "Light or dark theme"),
         ("uncert", "Click uncertainty"),
         ("nxt plc", "Next placement"),
         ("placement 7", "Placement 7"),
         ("frame 100", "Frame 100"),
         ("time 12.5", "Time 12.5 s"),
-        ("placement 70", "Placement 70"),
     ):
         assert found(page, query)[0] == first, query
-    expect(page.page.locator("#palette .entry").first).to_contain_text("There are 20 placements")
+    assert found(page, "placement 70") == []
+    expect(page.page.locator("#palette [role=status]")).to_contain_text("There are 20 placements")
     assert found(page, "qqq") == []
     expect(page.page.locator("#palette [role=status]")).to_contain_text("Nothing found")
     page.page.keyboard.press("Control+k")
@@ -98,7 +97,8 @@ def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
     expect(page.page.locator("dialog[open]")).to_have_count(0)
     page.page.click("#search")
     count = page.value("document.querySelectorAll('#palette .entry').length")
-    assert count >= len(table) >= 45
+    assert count > 30
+    assert len(table) >= 45
     for _ in range(2):
         page.page.keyboard.press("ArrowUp")
     chosen = page.page.locator('#palette .entry[aria-selected="true"]')
@@ -129,8 +129,8 @@ def test_the_help_leads_to_the_documentation_and_its_search(page: Driver) -> Non
 def test_what_needs_images_is_refused_with_the_reason(open_page: Callable[..., Driver], radar_only_server: Any) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look")
     opened(page)
-    assert found(page, "export")[0].startswith("Export the calibration")
-    expect(page.page.locator("#palette .entry").first).to_contain_text("There are no images in this recording")
+    assert found(page, "export") == []
+    expect(page.page.locator("#palette [role=status]")).to_contain_text("There are no images in this recording")
     page.page.keyboard.press("Escape")
     expect(page.page.locator("dialog[open]")).to_have_count(0)
     page.press("Enter", "e", "Delete", "x", "Control+z")

@@ -298,19 +298,15 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
 
 
 @pytest.mark.parametrize("held_from", [0])
-def test_the_cross_that_enter_brings_before_any_proposal_gives_way_to_the_first_one(
-    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
+def test_enter_before_any_proposal_goes_on_and_marks_nothing(
+    proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
     page = open_page(proposing.url)
     page.until("__cocalib.state.placements.length > 0 && __cocalib.state.proposals")
     page.go_to(page.value("__cocalib.state.placements[0].frame"))
     page.press("Enter")
-    assert page.value("__cocalib.state.cross") is not None
-    images.allowed.set()
-    page.until("__cocalib.state.cross === null")
-    guide(page)
-    page.press("Enter")
-    assert [click["frame"] for click in page.view["clicks"]] == [page.value("__cocalib.state.placements[0].frame")]
+    assert page.value("__cocalib.state.cross") is None
+    assert page.view["clicks"] == []
 
 
 def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
