@@ -127,16 +127,13 @@ class PublishedCamera(Protocol):
     @property
     def file(self) -> Path:
         """The file."""
-        ...
 
     @property
     def doubt(self) -> str:
         """What is not certain about them; "" if nothing."""
-        ...
 
     def camera(self, image_size_px: tuple[int, int]) -> Camera:
         """Return the camera; raises ValueError if the numbers are not a camera's."""
-        ...
 
 
 def published_camera(published: PublishedCamera, images: ImageStream) -> tuple[Camera | None, list[DataWarning]]:

@@ -6,6 +6,7 @@ import shutil
 import sys
 import zlib
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -57,7 +58,7 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
         unpacker = _unpacker(kind, where)
         try:
             part = unpacker.decompress(data, max_length=left)
-        except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()) as error:
+        except _damage() as error:
             raise RecordingError(f"{where}: the {kind} data is damaged ({error}); copy the file again") from error
         parts.append(part)
         left -= len(part)
@@ -109,7 +110,7 @@ def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
                 break
             parts.append(unpacker.decompress(data[index : index + _PIECE_BYTES], max_length=left))
             left -= len(parts[-1])
-    except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()):
+    except _damage():
         pass  # keep what was decompressed before the error
     return b"".join(parts)
 
@@ -123,7 +124,7 @@ def unpack_message(data: bytes, *, where: str) -> bytes:
     unpacker = _unpacker("zstd", where)
     try:
         message = unpacker.decompress(data, max_length=MAX_CHUNK_BYTES)
-    except _zstd_error() as error:
+    except _damage() as error:
         raise RecordingError(f"{where}: a zstd message is damaged ({error}); copy the file again") from error
     if not unpacker.eof:
         raise RecordingError(f"{where}: a zstd message is truncated or over 256 MiB; copy the file again")
@@ -193,7 +194,7 @@ def _copy(file: FileBytes, kind: str, target: Path) -> tuple[int, str]:
         while True:
             try:
                 piece = packed.read1(_COPIED_BYTES)
-            except (OSError, EOFError, RuntimeError, ValueError, zlib.error, _zstd_error()) as error:
+            except _damage() as error:
                 return size, " ".join(str(error).split())
             if not piece:
                 return size, ""
@@ -220,15 +221,7 @@ def _reader(kind: str) -> Callable[[Path], Any]:
         from lz4.frame import LZ4FrameFile
 
         return lambda path: LZ4FrameFile(str(path))
-    return _open_zstd
-
-
-def _open_zstd(path: Path) -> Any:
-    if sys.version_info >= (3, 14):
-        from compression import zstd
-    else:
-        from backports import zstd
-    return zstd.open(path)
+    return zstandard().open
 
 
 def _unpacker(kind: str, where: str) -> _Unpacker:
@@ -240,18 +233,15 @@ def _unpacker(kind: str, where: str) -> _Unpacker:
         unpacker: _Unpacker = LZ4FrameDecompressor()
         return unpacker
     if kind == "zstd":
-        if sys.version_info >= (3, 14):
-            from compression.zstd import ZstdDecompressor
-        else:
-            from backports.zstd import ZstdDecompressor
-
-        return ZstdDecompressor()
+        return zstandard().ZstdDecompressor()
     raise RecordingError(f"{where}: unknown compression '{kind}'; none, bz2, lz4 and zstd are supported")
 
 
-def _zstd_error() -> type[Exception]:
-    if sys.version_info >= (3, 14):
-        from compression.zstd import ZstdError
-    else:
-        from backports.zstd import ZstdError
-    return ZstdError
+def zstandard() -> Any:
+    """Return the module of Zstandard, which Python has since 3.14."""
+    return import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")
+
+
+def _damage() -> tuple[type[Exception], ...]:
+    """Return what the decompressors raise for damaged data."""
+    return OSError, EOFError, RuntimeError, ValueError, zlib.error, zstandard().ZstdError

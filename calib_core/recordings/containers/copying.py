@@ -9,23 +9,8 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import Chunk
+from calib_core.recordings.containers.mcap import records
 from calib_core.recordings.containers.mcap.reader import McapSource
-from calib_core.recordings.containers.mcap.records import (
-    ATTACHMENT,
-    CHANNEL,
-    DATA_END,
-    FOOTER,
-    HEADER,
-    MAGIC,
-    MAX_RECORD_BYTES,
-    MESSAGE_HEAD,
-    METADATA,
-    RECORD,
-    SCHEMA,
-    Declarations,
-    string_at,
-    walk,
-)
 from calib_core.recordings.containers.mcap.recovery import FoundInMcap, Part, parts_of_mcap
 from calib_core.recordings.containers.mcap.writing import AttachmentHead, McapWriter
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
@@ -234,43 +219,43 @@ def besides_messages(source: McapSource) -> BesidesMessages:
             parts.append(part)
         declared = mcap.declarations
     else:
-        declared = Declarations()
+        declared = records.Declarations()
         parts = list(_parts(source))
         for part in (*parts, *_summary(source)):
-            if part.kind in (SCHEMA, CHANNEL) and part.end - part.start <= MAX_RECORD_BYTES:
+            if part.kind in (records.SCHEMA, records.CHANNEL) and part.end - part.start <= records.MAX_RECORD_BYTES:
                 declared.note(part.kind, source.file.up_to(part.start, part.end - part.start))
-    header = next((part for part in parts if part.kind == HEADER), None)
-    kept = tuple(part for part in parts if part.kind in (ATTACHMENT, METADATA))
+    header = next((part for part in parts if part.kind == records.HEADER), None)
+    kept = tuple(part for part in parts if part.kind in (records.ATTACHMENT, records.METADATA))
     return BesidesMessages(_profile(source, header), declared.stored, kept)
 
 
 def _parts(source: McapSource) -> Iterator[Part]:
     """Yield the records outside chunks, reading only the heads of all records."""
-    place = len(MAGIC)
-    while place + RECORD.size <= source.size_bytes:
-        kind, size = RECORD.unpack(source.file.at(place, RECORD.size))
-        start = place + RECORD.size
-        if kind in (DATA_END, FOOTER) or size > source.size_bytes - start:
+    place = len(records.MAGIC)
+    while place + records.RECORD.size <= source.size_bytes:
+        kind, size = records.RECORD.unpack(source.file.at(place, records.RECORD.size))
+        start = place + records.RECORD.size
+        if kind in (records.DATA_END, records.FOOTER) or size > source.size_bytes - start:
             return
-        if kind in (HEADER, SCHEMA, CHANNEL, ATTACHMENT, METADATA):
+        if kind in (records.HEADER, records.SCHEMA, records.CHANNEL, records.ATTACHMENT, records.METADATA):
             yield Part(kind, place, start, start + size)
         place = start + size
 
 
 def _summary(source: McapSource) -> Iterator[Part]:
     """Yield the schemas and channels that the summary repeats."""
-    begin = int.from_bytes(source.file.up_to(source.size_bytes - _TAIL_BYTES + RECORD.size, 8), "little")
+    begin = int.from_bytes(source.file.up_to(source.size_bytes - _TAIL_BYTES + records.RECORD.size, 8), "little")
     stretch = FileStretch(source.file, begin, source.size_bytes - _TAIL_BYTES - begin)
-    for kind, start, size in walk(stretch):
-        if kind in (SCHEMA, CHANNEL):
-            yield Part(kind, begin + start - RECORD.size, begin + start, begin + start + size)
+    for kind, start, size in records.walk(stretch):
+        if kind in (records.SCHEMA, records.CHANNEL):
+            yield Part(kind, begin + start - records.RECORD.size, begin + start, begin + start + size)
 
 
 def _profile(source: McapSource, header: Part | None) -> str:
     if header is None:
         return ""
     try:
-        return string_at(source.file.up_to(header.start, min(header.end - header.start, _HEAD_BYTES)), 0)[0]
+        return records.string_at(source.file.up_to(header.start, min(header.end - header.start, _HEAD_BYTES)), 0)[0]
     except struct.error:
         return ""
 
@@ -280,9 +265,9 @@ def copy_besides(source: McapSource, besides: BesidesMessages, writer: McapWrite
     damaged = 0
     for part in besides.parts:
         try:
-            if part.kind == METADATA:
+            if part.kind == records.METADATA:
                 body = source.file.at(part.start, part.end - part.start)
-                writer.metadata_record(string_at(body, 0)[0], body)
+                writer.metadata_record(records.string_at(body, 0)[0], body)
             else:
                 head = _attachment_head(source.file.up_to(part.start, min(_HEAD_BYTES, part.end - part.start)))
                 writer.attachment_record(head, part.end - part.start, _pieces(source, part))
@@ -293,8 +278,8 @@ def copy_besides(source: McapSource, besides: BesidesMessages, writer: McapWrite
 
 def _attachment_head(body: bytes) -> AttachmentHead:
     log_time, create_time = struct.unpack_from("<QQ", body)
-    name, place = string_at(body, 16)
-    media_type, place = string_at(body, place)
+    name, place = records.string_at(body, 16)
+    media_type, place = records.string_at(body, place)
     return AttachmentHead(name, media_type, log_time, create_time, struct.unpack_from("<Q", body, place)[0])
 
 
@@ -309,10 +294,10 @@ def sent(source: McapSource, chunk: int, offset: int) -> tuple[int, int]:
     Raises:
         RecordingError: there is no message at this place.
     """
-    head = source.piece(chunk, offset + RECORD.size, MESSAGE_HEAD.size)
-    if len(head) < MESSAGE_HEAD.size:
+    head = source.piece(chunk, offset + records.RECORD.size, records.MESSAGE_HEAD.size)
+    if len(head) < records.MESSAGE_HEAD.size:
         raise RecordingError(f"{source.path}: no message at the indexed position (chunk {chunk}, byte {offset})")
-    _, sequence, _, publish_time = MESSAGE_HEAD.unpack(head)
+    _, sequence, _, publish_time = records.MESSAGE_HEAD.unpack(head)
     return sequence, publish_time
 
 

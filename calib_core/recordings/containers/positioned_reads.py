@@ -111,11 +111,9 @@ class Stretch(Protocol):
 
     def up_to(self, offset: int, size: int) -> bytes:
         """Return at most size bytes from offset."""
-        ...
 
     def find(self, pattern: "re.Pattern[bytes]", start: int) -> int:
         """Return where the pattern is found next, -1 where it is not."""
-        ...
 
 
 class MemoryStretch:

@@ -166,50 +166,40 @@ class Source(Protocol):
     @property
     def path(self) -> Path:
         """The path of the file."""
-        ...
 
     @property
     def size_bytes(self) -> int:
         """The size of the file."""
-        ...
 
     @property
     def container(self) -> str:
         """The format and its compression, such as "ROS 1 bag, lz4"."""
-        ...
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """The topics it declares."""
-        ...
 
     @property
     def counts(self) -> Mapping[int, int]:
         """Number of messages of each channel, as far as the file states it."""
-        ...
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
         """Warnings found on opening the file."""
-        ...
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
         """Warnings found since, while reading it."""
-        ...
 
     @property
     def assumptions(self) -> tuple[Assumption, ...]:
         """What the file does not state and reading it takes for granted."""
-        ...
 
     def index(self, channel_id: int) -> MessageIndex:
         """Return the locations of a channel's messages."""
-        ...
 
     def read(self, chunk: int, offset: int) -> bytes:
         """Read one whole message."""
-        ...
 
     def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Read the first bytes of many messages, in the order of the index, reading as little as the format allows.
@@ -219,11 +209,9 @@ class Source(Protocol):
             size: number of bytes of each message.
             keep: store them in the user's cache, because the next opening will need the same ones.
         """
-        ...
 
     def close(self) -> None:
         """Close the file."""
-        ...
 
 
 class GrowingSource(Source, Protocol):
@@ -232,7 +220,6 @@ class GrowingSource(Source, Protocol):
     @property
     def is_complete(self) -> bool:
         """Whether the writer has closed the file."""
-        ...
 
     def grow(self) -> int:
         """Index the messages that have been written completely since; return how many there are.
@@ -240,8 +227,6 @@ class GrowingSource(Source, Protocol):
         Raises:
             RecordingError: what had been read has changed, or what follows cannot be read.
         """
-        ...
 
     def renamed(self, path: Path) -> None:
         """Take note that the writer has renamed the file."""
-        ...

@@ -10,25 +10,7 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource, recovery_warning
-from calib_core.recordings.containers.mcap.records import (
-    BETWEEN_CHUNKS,
-    CHUNK_INDEX,
-    FOOTER,
-    MAGIC,
-    MAX_RECORD_BYTES,
-    MESSAGE,
-    MESSAGE_HEAD,
-    MESSAGE_INDEX,
-    PRIVATE,
-    RECORD,
-    STATISTICS,
-    ChunkInfo,
-    Declarations,
-    chunk_info,
-    crc_position,
-    statistics,
-    walk,
-)
+from calib_core.recordings.containers.mcap import records
 from calib_core.recordings.containers.mcap.recovery import scan_mcap
 from calib_core.recordings.containers.positioned_reads import FileStretch, MemoryStretch
 from calib_core.recordings.containers.sources import MessageIndex
@@ -50,7 +32,7 @@ class McapSource(ChunkedSource):
     """
 
     format_name = "MCAP"
-    lead_bytes = RECORD.size + MESSAGE_HEAD.size
+    lead_bytes = records.RECORD.size + records.MESSAGE_HEAD.size
 
     def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
         super().__init__(file, whole=first_of is None)
@@ -84,7 +66,7 @@ class McapSource(ChunkedSource):
     def _summary_start(self) -> int | None:
         """Return the position of the summary; 0 for a file without one, None for a file that was not closed."""
         tail = self.file.up_to(max(0, self.size_bytes - _TAIL_BYTES), _TAIL_BYTES)
-        if len(tail) < _TAIL_BYTES or tail[-8:] != MAGIC or tail[0] != FOOTER:
+        if len(tail) < _TAIL_BYTES or tail[-8:] != records.MAGIC or tail[0] != records.FOOTER:
             return None
         start = int.from_bytes(tail[9:17], "little")
         return start if start <= self.size_bytes - _TAIL_BYTES else None
@@ -112,21 +94,21 @@ class McapSource(ChunkedSource):
         complete = complete and all(found.get(channel, 0) >= count for channel, count in self.counts.items())
         return complete and known >= self._found.keys()
 
-    def _require_nothing_unindexed(self, infos: list[ChunkInfo], end: int) -> None:
+    def _require_nothing_unindexed(self, infos: list[records.ChunkInfo], end: int) -> None:
         """Refuse chunks, messages and unknown bytes between the chunks that the summary names.
 
         Raises:
             RecordingError: there are some, or chunks overlap.
         """
-        place = len(MAGIC)
+        place = len(records.MAGIC)
         for begin, after in sorted([(info.position, info.index_place[1]) for info in infos] + [(end, end)]):
             while place < begin:
-                head = self.file.up_to(place, RECORD.size)
-                kind, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
-                if kind not in BETWEEN_CHUNKS and kind < PRIVATE:
+                head = self.file.up_to(place, records.RECORD.size)
+                kind, size = records.RECORD.unpack(head) if len(head) == records.RECORD.size else (0, 0)
+                if kind not in records.BETWEEN_CHUNKS and kind < records.PRIVATE:
                     raise self._damaged(place)
-                self._private_bytes += RECORD.size + size if kind >= PRIVATE else 0
-                place += RECORD.size + size
+                self._private_bytes += records.RECORD.size + size if kind >= records.PRIVATE else 0
+                place += records.RECORD.size + size
             if place != begin:
                 raise self._damaged(begin)
             place = after
@@ -147,24 +129,24 @@ class McapSource(ChunkedSource):
             self._read_chunk_index(info)
         self._note_indexes()
 
-    def _read_chunk_infos(self, start: int, first_of: ChannelFilter | None = None) -> list[ChunkInfo]:
+    def _read_chunk_infos(self, start: int, first_of: ChannelFilter | None = None) -> list[records.ChunkInfo]:
         """Read the summary (channels, statistics, chunk indexes), in full or until some channels are found."""
-        infos: list[ChunkInfo] = []
-        declared = Declarations()
+        infos: list[records.ChunkInfo] = []
+        declared = records.Declarations()
         stretch = FileStretch(self.file, start, self.size_bytes - _TAIL_BYTES - start)
         end = 0
-        for kind, place, size in walk(stretch):
+        for kind, place, size in records.walk(stretch):
             end = place + size
-            body = stretch.up_to(place, size) if size <= MAX_RECORD_BYTES else b""
-            if kind == CHUNK_INDEX:
-                info = chunk_info(body)
+            body = stretch.up_to(place, size) if size <= records.MAX_RECORD_BYTES else b""
+            if kind == records.CHUNK_INDEX:
+                info = records.chunk_info(body)
                 if info is None or not info.inside(self.size_bytes):
                     raise self._damaged(start + place)
                 infos.append(info)
                 if first_of is not None and _shows(infos, declared, first_of):
                     break
-            elif kind == STATISTICS:
-                self._counted, self.counts = statistics(body)
+            elif kind == records.STATISTICS:
+                self._counted, self.counts = records.statistics(body)
             elif not declared.note(kind, body):
                 raise self._damaged(start + place)
         else:
@@ -175,14 +157,14 @@ class McapSource(ChunkedSource):
 
     def _summary_is_sound(self, start: int) -> bool:
         """Verify the summary section against the checksum in the footer; 0 means no checksum."""
-        end = self.size_bytes - len(MAGIC) - 4
+        end = self.size_bytes - len(records.MAGIC) - 4
         wanted = int.from_bytes(self.file.up_to(end, 4), "little")
         found = 0
         for index in range(start, end if wanted else start, _PIECE_BYTES):
             found = zlib.crc32(self.file.up_to(index, min(_PIECE_BYTES, end - index)), found)
         return found == wanted
 
-    def _read_chunk_index(self, info: ChunkInfo) -> None:
+    def _read_chunk_index(self, info: records.ChunkInfo) -> None:
         """Record one chunk, and read the message indexes that follow it."""
         number = len(self.chunks)
         self.chunks.append(Chunk(info.data_position, info.stored_bytes, info.size_bytes, info.compression))
@@ -190,9 +172,9 @@ class McapSource(ChunkedSource):
         block = MemoryStretch(self.file.at(first_byte, last_byte - first_byte))
         end = 0
         indexed = set()
-        for kind, first, length in walk(block):
+        for kind, first, length in records.walk(block):
             end = first + length
-            if kind != MESSAGE_INDEX:
+            if kind != records.MESSAGE_INDEX:
                 raise self._damaged(first_byte + first)
             indexed.add(self._read_message_index(number, block.data[first:end], first_byte + first))
         if end != block.size or (block.size and not indexed >= set(info.channels)):
@@ -231,7 +213,7 @@ class McapSource(ChunkedSource):
         unknown = sum(len(entries) for channel, entries in mcap.messages.items() if channel not in known)
         sound = closed and mcap.ended and not (mcap.lost_bytes or mcap.damaged_chunks or unknown)
         if not sound and count == unknown:
-            raise self._damaged(len(MAGIC))
+            raise self._damaged(len(records.MAGIC))
         self._note_indexes()
         if not sound:
             warning = recovery_warning(
@@ -261,25 +243,25 @@ class McapSource(ChunkedSource):
         where = self.chunks[chunk]
         if not where.position:
             return 0  # the whole file, for messages outside chunks
-        head = self.file.up_to(crc_position(where.position, where.compression) - 8, 12)
+        head = self.file.up_to(records.crc_position(where.position, where.compression) - 8, 12)
         size, checksum = int.from_bytes(head[:8], "little"), int.from_bytes(head[8:], "little")
         return checksum if size == where.size_bytes else 0
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
         """Return the offset of the message itself, and its length."""
-        head = self.piece(chunk, offset, RECORD.size)
-        kind, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
-        if kind != MESSAGE or not MESSAGE_HEAD.size <= size <= MAX_RECORD_BYTES:
+        head = self.piece(chunk, offset, records.RECORD.size)
+        kind, size = records.RECORD.unpack(head) if len(head) == records.RECORD.size else (0, 0)
+        if kind != records.MESSAGE or not records.MESSAGE_HEAD.size <= size <= records.MAX_RECORD_BYTES:
             raise RecordingError(
                 f"{self.path}: no message at the indexed position (chunk {chunk}, byte {offset}); the file is damaged: "
                 f"mcap recover {self.path.name}"
             )
-        return offset + self.lead_bytes, size - MESSAGE_HEAD.size
+        return offset + self.lead_bytes, size - records.MESSAGE_HEAD.size
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Recognise message records, which all have the same layout."""
-        sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - MESSAGE_HEAD.size
-        return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
+        sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - records.MESSAGE_HEAD.size
+        return (rows[:, 0] == records.MESSAGE) & (sizes >= 0) & (sizes <= records.MAX_RECORD_BYTES), sizes
 
 
 def _private_record_warning(path: Path, count: int) -> DataWarning:
@@ -290,7 +272,7 @@ def _private_record_warning(path: Path, count: int) -> DataWarning:
     )
 
 
-def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:
+def _shows(infos: list[records.ChunkInfo], declared: records.Declarations, first_of: ChannelFilter) -> bool:
     """Return whether the wanted channels are known, and all of them occur in the chunks seen so far."""
     count = len(infos)
     if count < FIRST_CHUNKS or count & (count - 1):  # checked again each time their number doubles

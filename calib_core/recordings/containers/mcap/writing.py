@@ -1,32 +1,13 @@
 """Write MCAP files: chunks with message indexes, attachments, metadata, and a summary. Memory is bounded by one chunk."""
 
 import struct
-import sys
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import BinaryIO, Literal
 
-from calib_core.recordings.containers.mcap.records import (
-    ATTACHMENT,
-    ATTACHMENT_INDEX,
-    CHANNEL,
-    CHUNK,
-    CHUNK_INDEX,
-    DATA_END,
-    FOOTER,
-    HEADER,
-    MAGIC,
-    MESSAGE,
-    MESSAGE_HEAD,
-    MESSAGE_INDEX,
-    METADATA,
-    METADATA_INDEX,
-    RECORD,
-    SCHEMA,
-    STATISTICS,
-    SUMMARY_OFFSET,
-)
+from calib_core.recordings.containers.compression import zstandard
+from calib_core.recordings.containers.mcap import records
 from calib_core.recordings.containers.sources import StoredChannel
 
 ChunkCompression = Literal["", "lz4", "zstd"]
@@ -108,8 +89,8 @@ class McapWriter:
         self._summary = _Summary()
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[StoredChannel, int] = {}
-        self._put(MAGIC)
-        self._put(_record(HEADER, _text(profile) + _text(f"{library} {version}".strip())))
+        self._put(records.MAGIC)
+        self._put(_record(records.HEADER, _text(profile) + _text(f"{library} {version}".strip())))
 
     @property
     def message_count(self) -> int:
@@ -122,7 +103,9 @@ class McapWriter:
         if number is None:
             number = self._channels[channel] = len(self._channels)
             head = struct.pack("<HH", number, self._schema(channel))
-            self._declare(CHANNEL, head + _text(channel.topic) + _text(channel.encoding) + _mapping(channel.notes))
+            self._declare(
+                records.CHANNEL, head + _text(channel.topic) + _text(channel.encoding) + _mapping(channel.notes)
+            )
         return number
 
     def _schema(self, channel: StoredChannel) -> int:
@@ -134,7 +117,7 @@ class McapWriter:
         if number is None:
             number = self._schemas[key] = len(self._schemas) + 1
             name, encoding, data = key
-            self._declare(SCHEMA, struct.pack("<H", number) + _text(name) + _text(encoding) + _sized(data))
+            self._declare(records.SCHEMA, struct.pack("<H", number) + _text(name) + _text(encoding) + _sized(data))
         return number
 
     def _declare(self, kind: int, body: bytes) -> None:
@@ -147,8 +130,8 @@ class McapWriter:
         chunk = self._chunk
         chunk.span(log_time)
         chunk.entries.setdefault(channel, []).append((log_time, len(chunk.records)))
-        size = MESSAGE_HEAD.size + len(data)
-        chunk.records += _MESSAGE_RECORD.pack(MESSAGE, size, channel, sequence, log_time, publish_time)
+        size = records.MESSAGE_HEAD.size + len(data)
+        chunk.records += _MESSAGE_RECORD.pack(records.MESSAGE, size, channel, sequence, log_time, publish_time)
         chunk.records += data
         summary = self._summary
         summary.counts[channel] = summary.counts.get(channel, 0) + 1
@@ -166,7 +149,7 @@ class McapWriter:
         times = struct.pack("<QQ", chunk.first_ns, chunk.last_ns)
         head = struct.pack("<QI", len(chunk.records), zlib.crc32(chunk.records)) + _text(self._compression)
         start = self._place
-        self._put(RECORD.pack(CHUNK, len(times) + len(head) + 8 + len(stored)) + times + head)
+        self._put(records.RECORD.pack(records.CHUNK, len(times) + len(head) + 8 + len(stored)) + times + head)
         self._put(struct.pack("<Q", len(stored)))
         self._put(stored)
         length, places = self._place - start, b""
@@ -174,10 +157,10 @@ class McapWriter:
         for channel, entries in chunk.entries.items():
             places += struct.pack("<HQ", channel, self._place)
             array = b"".join(struct.pack("<QQ", *entry) for entry in entries)
-            self._put(_record(MESSAGE_INDEX, struct.pack("<H", channel) + _sized(array)))
+            self._put(_record(records.MESSAGE_INDEX, struct.pack("<H", channel) + _sized(array)))
         body = times + struct.pack("<QQ", start, length) + _sized(places) + struct.pack("<Q", self._place - indexes)
         body += _text(self._compression) + struct.pack("<QQ", len(stored), len(chunk.records))
-        self._summary.add(CHUNK_INDEX, _record(CHUNK_INDEX, body))
+        self._summary.add(records.CHUNK_INDEX, _record(records.CHUNK_INDEX, body))
 
     def attachment(self, name: str, data: bytes, *, media_type: str, time: int) -> None:
         """Attach a file; time in ns."""
@@ -189,11 +172,14 @@ class McapWriter:
         """Write an attachment record, as it is, from pieces of its body; size is their total length."""
         self._end_chunk()
         start = self._place
-        self._put(RECORD.pack(ATTACHMENT, size))
+        self._put(records.RECORD.pack(records.ATTACHMENT, size))
         for piece in pieces:
             self._put(piece)
         body = struct.pack("<QQQQQ", start, self._place - start, head.log_time, head.create_time, head.size_bytes)
-        self._summary.add(ATTACHMENT_INDEX, _record(ATTACHMENT_INDEX, body + _text(head.name) + _text(head.media_type)))
+        self._summary.add(
+            records.ATTACHMENT_INDEX,
+            _record(records.ATTACHMENT_INDEX, body + _text(head.name) + _text(head.media_type)),
+        )
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record."""
@@ -203,30 +189,36 @@ class McapWriter:
         """Write a metadata record from its body."""
         self._end_chunk()
         start = self._place
-        self._put(_record(METADATA, body))
+        self._put(_record(records.METADATA, body))
         place = struct.pack("<QQ", start, self._place - start)
-        self._summary.add(METADATA_INDEX, _record(METADATA_INDEX, place + _text(name)))
+        self._summary.add(records.METADATA_INDEX, _record(records.METADATA_INDEX, place + _text(name)))
 
     def finish(self) -> None:
         """Write the last chunk, the summary and the footer."""
         self._end_chunk()
-        self._put(_record(DATA_END, struct.pack("<I", 0)))
-        self._summary.add(STATISTICS, _record(STATISTICS, self._statistics()))
+        self._put(_record(records.DATA_END, struct.pack("<I", 0)))
+        self._summary.add(records.STATISTICS, _record(records.STATISTICS, self._statistics()))
         start, checksum, offsets = self._place, 0, b""
-        for kind, records in self._summary.groups.items():
+        for kind, group in self._summary.groups.items():
             begin = self._place
-            for record in records:
+            for record in group:
                 checksum = zlib.crc32(record, checksum)
                 self._put(record)
-            offsets += _record(SUMMARY_OFFSET, struct.pack("<BQQ", kind, begin, self._place - begin))
-        footer = RECORD.pack(FOOTER, 20) + struct.pack("<QQ", start, self._place)
+            offsets += _record(records.SUMMARY_OFFSET, struct.pack("<BQQ", kind, begin, self._place - begin))
+        footer = records.RECORD.pack(records.FOOTER, 20) + struct.pack("<QQ", start, self._place)
         checksum = zlib.crc32(footer, zlib.crc32(offsets, checksum))
-        self._put(offsets + footer + struct.pack("<I", checksum) + MAGIC)
+        self._put(offsets + footer + struct.pack("<I", checksum) + records.MAGIC)
 
     def _statistics(self) -> bytes:
         summary = self._summary
         counts = b"".join(struct.pack("<HQ", channel, count) for channel, count in sorted(summary.counts.items()))
-        numbers = (SCHEMA, CHANNEL, ATTACHMENT_INDEX, METADATA_INDEX, CHUNK_INDEX)
+        numbers = (
+            records.SCHEMA,
+            records.CHANNEL,
+            records.ATTACHMENT_INDEX,
+            records.METADATA_INDEX,
+            records.CHUNK_INDEX,
+        )
         head = struct.pack("<QHIIII", self.message_count, *(summary.count(kind) for kind in numbers))
         return head + struct.pack("<QQ", summary.first_ns or 0, summary.last_ns) + _sized(counts)
 
@@ -241,16 +233,12 @@ def _compressed(data: bytearray, compression: ChunkCompression) -> bytes | bytea
 
         return bytes(lz4.frame.compress(bytes(data)))
     if compression == "zstd":
-        if sys.version_info >= (3, 14):
-            from compression import zstd
-        else:
-            from backports import zstd
-        return bytes(zstd.compress(bytes(data), level=1))
+        return bytes(zstandard().compress(bytes(data), level=1))
     return data
 
 
 def _record(kind: int, body: bytes) -> bytes:
-    return RECORD.pack(kind, len(body)) + body
+    return records.RECORD.pack(kind, len(body)) + body
 
 
 def _sized(data: bytes) -> bytes:
