@@ -31,6 +31,7 @@ export interface ClickRow {
   mark: "clicked" | "moved" | "snapped" | "untouched";
   sigma_px: number | null;
   chosen: boolean;
+  placement: number;
 }
 
 /** One number as displayed. */
@@ -263,6 +264,7 @@ export interface View {
   acknowledged: string[];
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
+  placements: ("open" | "marked" | "guess" | "dismissed" | "unlikely")[];
 }
 
 /** New values of some fields in some rows. */

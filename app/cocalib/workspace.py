@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from calib_core.arrays import TimesNs
-from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
@@ -27,6 +26,7 @@ from cocalib.session.state import AssumedReading, ChosenIntrinsics, RecordingFac
 from cocalib.solving.worker import SolverWorker
 from cocalib.view.build import view
 from cocalib.view.model import View
+from cocalib.view.placement_states import SeenPlacements
 from cocalib.view.reference import Reference
 
 _LONGEST_WAIT_S = 1.0
@@ -123,7 +123,7 @@ class Workspace:
         self.given = given or GivenIntrinsics()
         self._chosen: tuple[ChosenIntrinsics, Camera] | None = None
         self._history = restored.history
-        self._placements: tuple[Placement, ...] | None = None
+        self._seen: SeenPlacements | None = None
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
@@ -179,12 +179,12 @@ class Workspace:
         return kept[1]
 
     def _view_of(self, history: History) -> View:
-        return view(history, self.facts, self.reference, self._placements)
+        return view(history, self.facts, self.reference, self._seen)
 
-    def show_placements(self, placements: Sequence[Placement]) -> None:
-        """Take in the placements that were found in the radar data, so that the View says how many have no click."""
+    def show_placements(self, seen: SeenPlacements) -> None:
+        """Take in the placements that were found in the radar data, so that the View says what became of each."""
         with self._lock:
-            self._placements = tuple(placements)
+            self._seen = seen
             self._pending.append((self._view_of(self._history), self._subscribers))
         self._notify()
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Points3, Values, Vector2, Vector3, frozen_array
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.placement_groups import PlacementGroup, click_sigmas, placement_groups, steps_of_sigma
 from calib_core.camera import Camera
@@ -19,7 +19,7 @@ from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines, sigma_polar_of
 from calib_core.results import Calibration, Metrics, PairResult
 from calib_core.results.metrics import distances, metrics_of
 
@@ -243,7 +243,8 @@ def candidate_fits(calibration: Calibration, pair: Pair, candidates: Sequence[Ca
     points = np.array([candidate.position_radar_m for candidate in candidates])
     projected = calibration.reproject(points)
     away = projected - pair.pixel_px
-    covariances = _covariances(calibration, pair, candidates)
+    sigmas = np.array([candidate.sigma_polar for candidate in candidates])
+    covariances = reprojection_covariances(calibration, points, sigmas, sigma_px=pair.sigma_px)
     with np.errstate(invalid="ignore"):
         squared = np.einsum("ni,nij,nj->n", away, np.linalg.pinv(np.nan_to_num(covariances)), away)
     squared[~np.isfinite(covariances).all(axis=(1, 2))] = np.nan
@@ -254,12 +255,20 @@ def candidate_fits(calibration: Calibration, pair: Pair, candidates: Sequence[Ca
     return tuple(CandidateFit(*row) for row in rows)
 
 
-def _covariances(calibration: Calibration, pair: Pair, candidates: Sequence[Candidate]) -> np.ndarray:
-    """Return the covariance (n, 2, 2) [px^2] of click minus reprojection; NaN where it is not known."""
-    noise = calibration.noise_scale
-    sigma_px = calibration.options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px
-    reported = np.array([candidate.position_radar_m for candidate in candidates])
-    sigmas = np.array([candidate.sigma_polar for candidate in candidates]) * noise[1:]
+def reprojection_covariances(
+    calibration: Calibration, reported: Points3, sigma_polar: Points3 | None = None, *, sigma_px: float | None = None
+) -> np.ndarray:
+    """Return the covariance (n, 2, 2) [px^2] of click minus reprojection; NaN where it is not known.
+
+    Args:
+        calibration: the solved pose.
+        reported: (n, 3) radar positions.
+        sigma_polar: (n, 3) standard deviations of range [m], azimuth and elevation [rad]; as the options state by default.
+        sigma_px: of the click, per axis; as the options state by default.
+    """
+    noise, stated = calibration.noise_scale, calibration.options.noise
+    sigma_px = stated.sigma_px if sigma_px is None else sigma_px
+    sigmas = (sigma_polar_of(stated) if sigma_polar is None else sigma_polar) * np.array(noise[1:])
     true_points = calibration.radar_errors.corrected(reported)
     camera_from_radar = calibration.camera_from_radar
     _, by_point = calibration.camera.project_with_jacobian(camera_from_radar @ true_points)

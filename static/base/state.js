@@ -80,7 +80,7 @@ export function emit(topic) {
 
 /**
  * What is derived from the view and the marks as the user left them; made again once either changed.
- * @type {{rows: Click[], byFrame: Map<number, Click[]>, byId: Map<string, Click>, frames: number[]}|null}
+ * @type {{rows: Click[], byFrame: Map<number, Click[]>, byPlacement: Map<number, Click[]>, byId: Map<string, Click>}|null}
  */
 let derived = null;
 
@@ -95,12 +95,16 @@ function drawn() {
     });
     for (const draft of state.local.values()) if (draft.image_time) rows.push(placedHere(draft.image_time, draft));
   }
-  const frames = rows.map((click) => click.frame).filter((frame) => frame >= 0).sort((a, b) => a - b);
-  /** @type {Map<number, Click[]>} */
-  const byFrame = new Map();
-  for (const click of rows) byFrame.set(click.frame, [...(byFrame.get(click.frame) ?? []), click]);
-  derived = { rows, byFrame, byId: new Map(rows.map((click) => [click.id, click])), frames };
+  derived = { rows, byFrame: grouped(rows, "frame"), byPlacement: grouped(rows, "placement"), byId: new Map(rows.map((click) => [click.id, click])) };
   return derived;
+}
+
+/** @param {Click[]} rows @param {"frame"|"placement"} by @returns {Map<number, Click[]>} */
+function grouped(rows, by) {
+  /** @type {Map<number, Click[]>} */
+  const groups = new Map();
+  for (const click of rows) (groups.get(click[by]) ?? groups.set(click[by], []).get(click[by]))?.push(click);
+  return groups;
 }
 
 /** The clicks as they should be drawn now; a row that did not change is the same object as before. @returns {Click[]} */
@@ -112,7 +116,7 @@ function placedHere(image_time, draft) {
   return {
     id: "", image_time, frame: frameOf(image_time), u_px: draft.u, v_px: draft.v, state: mark === "untouched" ? "untouched" : "pending",
     projected_px: null, residual_px: null, ellipse: null, range_m: null, azimuth_deg: null, elevation_deg: null,
-    returns: null, outlier_probability: null, note: "", mark, sigma_px: null, chosen: false,
+    returns: null, outlier_probability: null, note: "", mark, sigma_px: null, chosen: false, placement: -1,
   };
 }
 
@@ -157,23 +161,8 @@ export function placementAt(index) {
   return here.find(isOffered) ?? here.find((placement) => !isDismissed(placement)) ?? here[0];
 }
 
-/** The clicks while a reflector stood at a placement, as far as the radar does not say that they are of another. @param {Placement} placement @returns {Click[]} */
-export function clicksOf(placement) {
-  const { frames } = drawn();
-  let [low, high] = [0, frames.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (state.seconds[frames[middle]] < placement.start_s) low = middle + 1;
-    else high = middle;
-  }
-  /** @type {Click[]} */
-  const found = [];
-  for (let at = low; at < frames.length && state.seconds[frames[at]] <= placement.end_s; at++) {
-    if (at > low && frames[at] === frames[at - 1]) continue;
-    found.push(...clicksIn(frames[at]).filter((click) => isOf(click, placement)));
-  }
-  return found;
-}
+/** The clicks of a placement, as far as that is known. @param {Placement} placement @returns {Click[]} */
+export const clicksOf = (placement) => drawn().byPlacement.get(state.placements.indexOf(placement)) ?? [];
 
 /** What clicks with an id are called. @type {Map<string, string>|null} */
 let names = null;
@@ -183,7 +172,7 @@ export function nameOf(id) {
   if (!names) {
     const found = (names = new Map());
     state.placements.forEach((placement, index) => {
-      const own = clicksOf(placement).filter((click) => !found.has(click.id));
+      const own = clicksOf(placement);
       own.forEach((click, place) => found.set(click.id, `${index + 1}${own.length > 1 ? String.fromCharCode(97 + (place % 26)) : ""}`));
     });
   }
@@ -206,9 +195,6 @@ function optionWords({ option, value }) {
 /** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */
 export const isClicked = (placement) => clicksOf(placement).length > 0;
 
-/** Whether a placement has a click that somebody looked at. @param {Placement} placement */
-export const isLookedAt = (placement) => clicksOf(placement).some((click) => click.state !== "untouched");
-
 /** Whether the user said that a placement is not the reflector. @param {Placement} placement */
 export const isDismissed = (placement) => dismissalOf(placement) !== undefined;
 
@@ -225,28 +211,14 @@ export function dismissalOf(placement) {
   });
 }
 
-/** Whether a placement still wants a click. @param {Placement} placement */
-export const isOffered = (placement) => !isDismissed(placement) && !isClicked(placement);
+/** What became of a placement. @param {Placement} placement */
+export const stateOf = (placement) => state.view?.placements[state.placements.indexOf(placement)] ?? "open";
 
-/** A range that differs this much from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */
-const APART_M = 0.75;
-/** The same across the radar's line of sight. */
-const ASIDE_M = 1.5;
+/** Whether a placement still wants a click; while one of its time is on its way, it does not. @param {Placement} placement */
+export const isOffered = (placement) => stateOf(placement) === "open" && !onTheWay().some((seconds) => placement.start_s <= seconds && seconds <= placement.end_s);
 
-/** Whether a click is of a placement: where several reflectors stand at once, the radar position tells. @param {Click} click @param {Placement} placement */
-function isOf(click, placement) {
-  const others = placementsAt(click.frame);
-  if (others.length < 2 || click.range_m === null) return true;
-  const away = (/** @type {Placement} */ one) => apart(click, one);
-  const mine = away(placement);
-  return others.every((one) => one === placement || away(one) >= mine) && mine < 2;
-}
-
-/** How far a click's radar position is from a placement, in steps that are too far. @param {Click} click @param {Placement} placement */
-function apart(click, placement) {
-  const aside = (((click.azimuth_deg ?? 0) - placement.azimuth_deg) * Math.PI * placement.range_m) / 180;
-  return Math.hypot((Number(click.range_m) - placement.range_m) / APART_M, aside / ASIDE_M);
-}
+/** When the clicks were, of which it is not known yet which placement they are of. */
+const onTheWay = () => (drawn().byPlacement.get(-1) ?? []).filter((click) => !click.id || click.state === "pending").map((click) => state.seconds[click.frame]);
 
 /** Change the selection. @param {string|null} id */
 export function select(id) {

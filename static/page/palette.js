@@ -3,7 +3,7 @@
 import { act, ACTIONS, keyNames, reasonAgainst, register } from "../base/actions.js";
 import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
-import { clicks, isClicked, nameOf, select, state } from "../base/state.js";
+import { clicks, isClicked, nameOf, select, state, stateOf } from "../base/state.js";
 import { openOption, optionRows } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { goTo, nearestIndex, pause } from "../time/player.js";
@@ -22,7 +22,8 @@ let rows = [];
 let chosen = 0;
 
 export function startPalette() {
-  register({ id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette });
+  register({ id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: () => togglePalette() });
+  register({ id: "still-objects", group: "Time", words: "List what stood still and is hardly the reflector", also: "placements left out", run: () => togglePalette(STILL), when: () => (state.placements.some((one) => stateOf(one) === "unlikely") ? "" : "There is none") });
   field.type = "text";
   field.placeholder = "Action or option, placement 7, pair 3, frame 120, time 12.5";
   field.spellcheck = false;
@@ -40,11 +41,14 @@ export function startPalette() {
   list.addEventListener("pointermove", (event) => choose(indexOf(event.target)));
 }
 
-/** Open the palette, or close it. */
-function togglePalette() {
+/** Finds what stood still and is hardly the reflector. */
+const STILL = "still object";
+
+/** Open the palette, or close it. @param {string} [query] to begin with */
+function togglePalette(query = "") {
   if (dialog.open) return dialog.close();
   if (document.querySelector("dialog[open]")) return;
-  field.value = "";
+  field.value = query;
   dialog.showModal();
   window.focus(); // the 3D view may have had the focus
   field.focus();
@@ -193,7 +197,7 @@ function placements() {
     group: "Placement",
     words: `Placement ${index + 1}`,
     detail: `${(state.seconds[placement.frame] ?? 0).toFixed(1)} s, ${placement.range_m.toFixed(1)} m away${state.looking || isClicked(placement) ? "" : ", no click yet"}`,
-    also: `of ${count} reflector`,
+    also: `of ${count} ${stateOf(placement) === "unlikely" ? STILL : "reflector"}`,
     reason: "",
     run: () => comeTo(placement.frame),
   }));

@@ -5,7 +5,7 @@
 
 import { act, actionNamed } from "../base/actions.js";
 import { make } from "../base/notices.js";
-import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state } from "../base/state.js";
+import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state, stateOf } from "../base/state.js";
 import { openOption } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
@@ -145,7 +145,9 @@ const misfits = (verdict) => (verdict.level === "contradictory" || OF_ALL.includ
 /** @param {Now} now @returns {Words} */
 function doneWords({ verdict }) {
   const by = does(verdict);
-  return ["Done.", { key: "E", label: "export", action: "export" }, ...(misfits(verdict) ? [misfits(verdict), SHOW] : by.length ? ["Better:", ...by] : [])];
+  const still = state.placements.filter((one) => stateOf(one) === "unlikely").length;
+  const rest = still ? [{ key: "", label: `${still} more still object${still > 1 ? "s" : ""}`, action: "still-objects" }] : [];
+  return ["Done.", { key: "E", label: "export", action: "export" }, ...(misfits(verdict) ? [misfits(verdict), SHOW] : by.length ? ["Better:", ...by] : []), ...rest];
 }
 
 /** What begins the verdict's action: a field or a panel. @param {import("../messages.js").VerdictRow} verdict @returns {Words} */

@@ -56,7 +56,7 @@ let isFresh = sessionStorage.getItem("cocalib-frame") === null;
 export function startProposals() {
   Object.assign(offers, { shown: shownOffer, confidences, clicked: correctProposal });
   for (const type of ["keydown", "pointerdown", "wheel"]) addEventListener(type, () => (isFresh = false), { capture: true });
-  on(["placements", "proposals"], openOn);
+  on(["placements", "proposals", "view"], openOn);
   on(["shown"], arrive);
   on(["shown", "view", "proposals", "placements", "playing"], notice);
   on(["view"], settle);
@@ -88,7 +88,7 @@ export function takeProposals(message) {
 function openOn() {
   const isMoved = state.cursor !== 0 || state.following !== null || state.looking || state.proposals === null;
   const first = state.placements.find(isOffered);
-  if (!isFresh || isMoved || !first) return;
+  if (!isFresh || isMoved || !first || !state.view || state.view.solving || state.view.verdict.done) return;
   isFresh = false;
   const best = openProposals()[0];
   if (best?.confidence > SURE) show(best);

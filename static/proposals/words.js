@@ -15,8 +15,8 @@ import { acceptProposal, heldBack, isSearching, nextPlace, nextProposal, openPro
 /** So many clicks show what the reflector looks like, where the images alone propose nothing. */
 const FIRST = 2;
 
-/** How many placements wait: with proposals those that were found, without any all; nothing while they are being searched for. */
-const leftWords = () => (isSearching() ? "" : ` (${openProposals().length || state.placements.filter(isOffered).length} left)`);
+/** How many placements wait; nothing while they are being searched for. */
+const leftWords = () => (isSearching() ? "" : ` (${state.placements.filter(isOffered).length} left)`);
 
 /** N found no proposal: say why, if that is not because all are decided. */
 function sayNone() {

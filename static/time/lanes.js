@@ -5,7 +5,7 @@
 
 import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
 import { offers } from "../base/offers.js";
-import { clicks, emit, isDismissed, isLookedAt, on, state } from "../base/state.js";
+import { clicks, emit, on, state, stateOf } from "../base/state.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
@@ -61,7 +61,13 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
   const sure = offers.confidences();
-  state.placements.forEach((placement, index) => drawPlacement(pen, placement, sure.get(index) ?? 0, boxes.placements, axis));
+  const rows = rowsOf(state.placements);
+  const { top, bottom } = boxes.placements;
+  state.placements.forEach((placement, index) => {
+    const { row, of } = rows[index];
+    const high = (bottom - top + 1) / of();
+    drawPlacement(pen, placement, sure.get(index) ?? 0, { top: top + row * high, bottom: top + (row + 1) * high - 1 }, axis);
+  });
   for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
   if (pointer !== null && pointer >= lanes.left) {
     pen.fillStyle = themeColour("line-strong");
@@ -84,11 +90,23 @@ function drawNames(pen, boxes) {
   }
 }
 
-/** What became of a placement. @param {import("../messages.js").PlacementRow} placement @returns {"clicked"|"dismissed"|"open"} */
-export const fateOf = (placement) => (isLookedAt(placement) ? "clicked" : isDismissed(placement) ? "dismissed" : "open");
+/** Placements of one time lie below each other: the row of each, and how many there are. @param {import("../messages.js").PlacementRow[]} placements */
+function rowsOf(placements) {
+  /** @type {number[]} */
+  let ends = [];
+  /** @type {{row: number, of: () => number}[]} */
+  return placements.map(({ start_s, end_s }) => {
+    if (ends.every((end) => end <= start_s)) ends = [];
+    const own = ends;
+    const free = own.findIndex((end) => end <= start_s);
+    const row = free < 0 ? own.length : free;
+    own[row] = end_s;
+    return { row, of: () => own.length };
+  });
+}
 
 /**
- * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.
+ * Marked = solid, not marked = hollow and dashed, dismissed = a line with a cross, hardly the reflector = faint.
  * With a proposal: a bar at the lower edge, the longer the surer it is.
  * @param {Context2D} pen @param {import("../messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
  */
@@ -98,18 +116,18 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   const left = axis.toX(placement.start_s);
   const wide = Math.max(5, axis.toX(placement.end_s) - left);
   const [middle, height] = [left + wide / 2, bottom - top];
-  const fate = fateOf(placement);
+  const fate = stateOf(placement);
   const current = placement.start_s <= here && here <= placement.end_s;
   pen.lineWidth = 1;
   pen.beginPath();
   pen.roundRect(left, top, wide, height, 3);
-  pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" ? "faint" : "accent");
+  pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" || fate === "unlikely" ? "faint" : "accent");
   if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2);
-  pen.fillStyle = themeColour(fate === "clicked" ? "accent" : "accent-soft");
-  pen.globalAlpha = fate === "clicked" ? 0.55 : 1;
-  pen.fill();
+  pen.fillStyle = themeColour(fate === "marked" ? "accent" : "accent-soft");
+  pen.globalAlpha = fate === "marked" ? 0.55 : 1;
+  if (fate !== "unlikely") pen.fill();
   pen.globalAlpha = 1;
-  pen.setLineDash(fate === "open" ? [3, 3] : []);
+  pen.setLineDash(fate === "marked" ? [] : [3, 3]);
   pen.stroke();
   pen.setLineDash([]);
   if (sure) {

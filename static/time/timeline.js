@@ -1,8 +1,8 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { hideTip, showTip } from "../base/notices.js";
-import { clicks, nameOf, on, onPainted, state } from "../base/state.js";
-import { changes, drawLanes, fateOf, laneBoxes, lanes } from "./lanes.js";
+import { clicks, nameOf, on, onPainted, state, stateOf } from "../base/state.js";
+import { changes, drawLanes, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
 
@@ -132,7 +132,8 @@ function explain(event) {
   showTip(lines.join("\n"), event.clientX, event.clientY - 10);
 }
 
-const FATES = { clicked: "clicked", open: "not clicked yet", dismissed: "dismissed" };
+/** What became of a placement, in words. */
+const STATES = { marked: "clicked", guess: "a guess", open: "not clicked yet", dismissed: "dismissed", unlikely: "another still object" };
 
 /** What the timeline shows at a time. @param {number} seconds @param {PointerEvent} event */
 function aboutTime(seconds, event) {
@@ -144,7 +145,7 @@ function aboutTime(seconds, event) {
     const placement = state.placements[number];
     const { range_m, start_s, end_s, note } = placement;
     if (note) lines.push(note);
-    lines.push(`placement ${number + 1}: ${range_m.toFixed(1)} m away, ${(end_s - start_s).toFixed(1)} s long, ${state.looking ? "" : FATES[fateOf(placement)]}`.replace(/, $/, ""));
+    lines.push(`placement ${number + 1}: ${range_m.toFixed(1)} m away, ${(end_s - start_s).toFixed(1)} s long, ${state.looking ? "" : STATES[stateOf(placement)]}`.replace(/, $/, ""));
   }
   const boxes = laneBoxes(canvas.clientHeight);
   if (event.offsetY > boxes.radar.bottom) lines.push(...aboutImage(seconds));

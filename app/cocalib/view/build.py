@@ -1,13 +1,12 @@
 """Build the View of a session, in one pure call; and the same figures of a calibration as lines of text."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from calib_core.association.placement_groups import linked_clicks
-from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.options import GatingOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement, PairResult
@@ -64,6 +63,7 @@ from cocalib.view.model import (
     WarningRow,
     warning_row,
 )
+from cocalib.view.placement_states import SeenPlacements, placement_states, placements_of_clicks
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.wording import plain
 
@@ -72,7 +72,7 @@ def view(
     history: History,
     facts: RecordingFacts,
     reference: Reference | None = None,
-    placements: Sequence[Placement] | None = None,
+    seen: SeenPlacements | None = None,
 ) -> View:
     """Return everything there is to draw about the current session.
 
@@ -80,14 +80,18 @@ def view(
         history: the session with what can be undone and redone.
         facts: the recording's frames.
         reference: a calibration to review; None if there is none.
-        placements: found in the radar data; None before they have been looked for.
+        seen: the placements that were found in the radar data; None before they have been looked for.
     """
     session = history.present
     outcome = session.outcome
     calibration = outcome if isinstance(outcome, Calibration) else None
     shown = shown_calibration(session, reference)
     stage = _stage(session)
-    verdict = _shown_verdict(session, facts, placements)
+    seen = seen or SeenPlacements()
+    of_clicks = placements_of_clicks(session, seen.placements)
+    states = placement_states(session, seen, of_clicks)
+    left = sum(state in ("open", "guess") for state in states) if states else None
+    verdict = verdict_on(outcome if session.clicks else None, left=left, unconfirmed=len(facts.unconfirmed(session)))
     return View(
         revision=session.revision,
         stage=stage,
@@ -99,7 +103,7 @@ def view(
         can_redo=bool(history.future),
         has_calibration=calibration is not None,
         method=session.options.method,
-        clicks=click_rows(session, facts),
+        clicks=click_rows(session, facts, of_clicks),
         metrics=metric_figures(calibration),
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
@@ -111,7 +115,8 @@ def view(
         reference=reference.name if reference else "",
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
         assumptions=_assumptions(session, facts),
-        verdict=verdict_row(verdict, session, placements),
+        verdict=verdict_row(verdict, session, left),
+        placements=states,
         dismissed=session.dismissed,
         acknowledged=session.acknowledged,
     )
@@ -234,41 +239,17 @@ def _line(figure: Figure, width: int) -> str:
     return f"{figure.label:<{width}}  {figure.value} {figure.unit}".rstrip()
 
 
-_SAME_M = 0.5
 _MOST_NAMED = 6
 
 
-def placements_left(session: Session, placements: Sequence[Placement] | None) -> int | None:
-    """Return how many placements have no click; None if no placement is known.
+def verdict_row(verdict: Verdict, session: Session, left: int | None) -> VerdictRow:
+    """Return the verdict for the page: by the first rule that holds while pairs are few, else as it is stated.
 
-    An excluded click counts, since its placement was looked at; a mark that nobody has touched does not. A dismissed placement
-    is not the reflector.
+    Args:
+        verdict: on the latest outcome.
+        session: with that outcome.
+        left: how many placements want a click; None if no placement is known.
     """
-    if not placements:
-        return None
-    times = [click.image_time for click in session.clicks if click.counts or click.excluded]
-    clicked = (any(placement.start <= time <= placement.end for time in times) for placement in placements)
-    return sum(
-        not (done or is_dismissed(placement, session)) for placement, done in zip(placements, clicked, strict=True)
-    )
-
-
-def is_dismissed(placement: Placement, session: Session) -> bool:
-    """Return whether the user said that a placement is not the reflector."""
-    at = [one for one in session.dismissed if placement.start <= one.time <= placement.end]
-    return any(float(np.linalg.norm(placement.position_radar_m - one.position_m)) < _SAME_M for one in at)
-
-
-def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence[Placement] | None) -> Verdict:
-    """Return the verdict on the latest outcome; without one, on what is there."""
-    left = placements_left(session, placements)
-    outcome = session.outcome if session.clicks else None
-    return verdict_on(outcome, left=left, unconfirmed=len(facts.unconfirmed(session)))
-
-
-def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placement] | None) -> VerdictRow:
-    """Return the verdict for the page: by the first rule that holds while pairs are few, else as it is stated."""
-    left = placements_left(session, placements)
     seen = _Pairs.of(verdict, session, left)
     rule = next((rule for rule in _RULES if rule.holds(seen)), _AS_STATED)
     action = ReviewPairs((seen.suspect,)) if rule.asks else action_of(verdict)

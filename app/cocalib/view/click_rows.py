@@ -154,8 +154,14 @@ class _Disagreement:
     of_pair: bool = False
 
 
-def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
-    """Return one row per click, in order of image time; a row that is as before is the same object."""
+def click_rows(session: Session, facts: RecordingFacts, placements: Mapping[str, int]) -> tuple[ClickRow, ...]:
+    """Return one row per click, in order of image time; a row that is as before is the same object.
+
+    Args:
+        session: with its clicks and the latest outcome.
+        facts: the recording's frames.
+        placements: the number of each click's placement, by id.
+    """
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     pairs = reprojections(calibration.pairs if calibration else session.checked)
     cause = disagreement(calibration.options) if calibration else disagreement(session.options)
@@ -163,7 +169,10 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     likely = {pair.id: pair for pair in session.outcome.pairs} if isinstance(session.outcome, Unsolvable) else {}
     times_ns = np.array([click.image_time for click in session.clicks], dtype=np.int64)
     rows = zip(session.clicks, facts.frames_at(times_ns).tolist(), strict=True)
-    made = (_row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause) for click, frame in rows)
+    made = (
+        _row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause, placements[click.id])
+        for click, frame in rows
+    )
     return tuple(_with_likely_return(row, likely[row.id]) if row.id in likely else row for row in made)
 
 
@@ -182,7 +191,12 @@ def _with_likely_return(row: ClickRow, pair: Pair) -> ClickRow:
 
 @lru_cache(maxsize=1 << 15)
 def _row(
-    click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None, cause: _Disagreement
+    click: ReflectorClick,
+    frame: int,
+    pair: Reprojection | None,
+    lone: Unpaired | None,
+    cause: _Disagreement,
+    placement: int,
 ) -> ClickRow:
     stamp = Stamp.of(click.image_time)
     if pair is None:
@@ -199,6 +213,7 @@ def _row(
             mark=click.mark,
             sigma_px=click.sigma_px,
             chosen=click.chosen is not None,
+            placement=placement,
         )
     state = _state(click, pair)
     residual_px = _residual_px(click, pair)
@@ -221,6 +236,7 @@ def _row(
         mark=click.mark,
         sigma_px=click.sigma_px,
         chosen=click.chosen is not None,
+        placement=placement,
     )
 
 

@@ -46,6 +46,9 @@ class Figure:
 
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
+PlacementState: TypeAlias = Literal["open", "marked", "guess", "dismissed", "unlikely"]
+"""Wants a click; has one that somebody looked at; has one that nobody has touched; is not the reflector, as the user said, or as
+the pose says: the camera does not see it, or sees nothing there that was put down."""
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
 
@@ -87,6 +90,7 @@ class ClickRow:
         mark: how it came to its pixel.
         sigma_px: its own standard deviation per axis; None if it has the options' value.
         chosen: a person said which return belongs to it.
+        placement: number of its placement; -1 if it is of none, or that is not known yet.
     """
 
     id: str
@@ -108,6 +112,7 @@ class ClickRow:
     mark: Mark = "clicked"
     sigma_px: float | None = None
     chosen: bool = False
+    placement: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,6 +272,7 @@ class View:
         verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
         acknowledged: the codes of the warnings that the user has read.
+        placements: what became of each placement that was found in the radar data.
     """
 
     revision: int
@@ -294,3 +300,4 @@ class View:
     acknowledged: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = _UNCLICKED
+    placements: tuple[PlacementState, ...] = ()

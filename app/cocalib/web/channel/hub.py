@@ -16,6 +16,7 @@ from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
 from cocalib.view.model import View, warning_row
+from cocalib.view.placement_states import SeenPlacements
 from cocalib.web.channel.boxes import BoxService
 from cocalib.web.channel.image_changes import ImageChanges, changes_of
 from cocalib.web.channel.lens import LensService
@@ -151,7 +152,7 @@ class Hub:
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says, as far as it is known."""
         before, self.survey = self.survey, survey
-        self.workspace.show_placements(survey.placements)
+        self.workspace.show_placements(SeenPlacements(survey.placements))
         for kind, message in self._survey_messages(survey):
             self.broadcast(message, kind)
         self.proposing.surveyed(survey.placements)
@@ -187,7 +188,7 @@ class Hub:
             except CalibrationError as error:
                 _log.warning("the radar could not be searched for placements: %s", error)
         if self.survey is not None:
-            self.workspace.show_placements(self.survey.placements)
+            self.workspace.show_placements(SeenPlacements(self.survey.placements))
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
         for kind, message in self._survey_messages(self.survey):
             self.broadcast(message, kind)

@@ -13,7 +13,7 @@ from calib_core.proposing import DwellView, Proposal
 from calib_core.proposing.dwell_views import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
-from cocalib.view.build import is_dismissed
+from cocalib.view.placement_states import SeenPlacements, Spots, is_dismissed
 from cocalib.view.wording import sentence
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
@@ -67,7 +67,9 @@ class ProposingService:
         self._is_due = False
         self._numbers: tuple[int, ...] = ()
         self._placements: tuple[Placement, ...] | None = None
+        self._all: tuple[Placement, ...] = ()
         self._asked: tuple[object, ...] = ()
+        self._shown_views: tuple[DwellView, ...] = ()
 
     def start(self) -> None:
         """Begin to tell the pages, on the running loop."""
@@ -79,6 +81,7 @@ class ProposingService:
 
     def surveyed(self, placements: tuple[Placement, ...]) -> None:
         """Propose for these placements from now on."""
+        self._all = placements
         long = [
             number
             for number, placement in enumerate(placements)
@@ -165,6 +168,23 @@ class ProposingService:
         self._is_due = False
         if self._loop is not None:
             self._tell(self._news(), "proposals")
+            self._show_spots()
+
+    def _show_spots(self) -> None:
+        """Say which placements the images show, once all were looked at."""
+        now = self._job.snapshot
+        if now.progress.stage != "ready" or now.views is self._shown_views:
+            return
+        self._shown_views = now.views
+        number = {id(one): self._numbers[at] for at, one in enumerate(self._placements or ())}
+        spots = {
+            number[id(view.placement)]: Spots(
+                np.array([one.pixel_px for one in view.candidates]).reshape(-1, 2), view.width_px
+            )
+            for view in now.views
+            if len(view.frames) and id(view.placement) in number
+        }
+        self._workspace.show_placements(SeenPlacements(self._all, spots))
 
     def _news(self) -> ProposalNews:
         now = self._job.snapshot

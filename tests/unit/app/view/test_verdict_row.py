@@ -6,47 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.association.placements import Placement
 from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
 from calib_core.results.actions import ClickMore, Export, ReduceError
 from calib_core.results.verdict import Assumed, StatedError, Verdict, stated_error, verdict_on
 from calib_core.words.text import PairPart
 from calib_core.words.verdict import error_text
-from cocalib.session.applying import History, advance
-from cocalib.session.events import ClickPlaced, PlacementDismissed
 from cocalib.session.state import RecordingFacts, Session
-from cocalib.view.build import placements_left, verdict_row
+from cocalib.view.build import verdict_row
 from cocalib.view.click_rows import disagreement
 from tests.unit.app.view.test_view import FIVE, calibration, pair, shown
 
 ERROR = StatedError(rotation_deg=0.3, position_cm=3.0, image_px=4.0, range_m=9.0, in_plane=False)
 ASSUMED = Assumed(measured=False, alone_cm=np.nan, not_mirrored=True, elevations=True, principal_point_px=5.0)
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
-
-
-def placement(start_s: int, x_m: float = 5.0) -> Placement:
-    start, end = TimeNs(start_s * 10**9), TimeNs((start_s + 4) * 10**9)
-    values = {"start": start, "end": end, "position_radar_m": np.array([x_m, 0.0, 0.0])}
-    others = {name: 1.0 for name in Placement.__dataclass_fields__ if name not in values}
-    return Placement(**(others | values))
-
-
-def test_a_placement_is_left_until_it_is_clicked_or_dismissed():
-    found = [placement(1), placement(11), placement(21), placement(31), placement(31, 9.0)]
-    history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), (1.0, 1.0), "clicked"), FACTS)
-    assert placements_left(history.present, found) == 4
-    history = advance(history, PlacementDismissed(TimeNs(32 * 10**9), (5.0, 0.0, 0.0)), FACTS)
-    assert placements_left(history.present, found) == 3, "of two placements at once only the dismissed one is gone"
-    assert placements_left(history.present, ()) is None
-    assert placements_left(history.present, None) is None
-
-
-def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked():
-    click = ReflectorClick(TimeNs(2 * 10**9), "c1", 1.0, 1.0)
-    assert placements_left(Session(clicks=(click,)), [placement(1)]) == 0
-    assert placements_left(Session(clicks=(replace(click, excluded=True),)), [placement(1)]) == 0
-    assert placements_left(Session(clicks=(replace(click, mark="untouched"),)), [placement(1)]) == 1
 
 
 def test_done_is_said_with_the_key_that_exports():
@@ -98,30 +71,28 @@ def test_few_pairs_are_counted_and_the_one_that_does_not_fit_is_named(pairs, war
 def test_of_four_pairs_with_a_wrong_one_a_further_placement_is_asked_for():
     lost = Unsolvable("no-pose", {"agreeing": 3, "pairs": 4})
     session = Session(clicks=(ReflectorClick(TimeNs(2 * 10**9), "c1", 1.0, 1.0),), outcome=lost)
-    found = [placement(1), placement(11)]
-    row = verdict_row(verdict_on(lost, left=1), session, found)
+    row = verdict_row(verdict_on(lost, left=1), session, 1)
     assert (row.level, row.early, row.key, row.kind) == ("coarse", False, "N", "FollowHint")
     two = Unsolvable("no-pose", {"agreeing": 3, "pairs": 5})
-    assert verdict_row(verdict_on(two, left=1), replace(session, outcome=two), found).level == "contradictory"
+    assert verdict_row(verdict_on(two, left=1), replace(session, outcome=two), 1).level == "contradictory"
 
 
 def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
     eight = tuple(pair(f"c{number}") for number in range(1, 9))
     error = stated_error(calibration(*eight))
     coarse = Verdict("coarse", ClickMore(3), error=error, assumed=ASSUMED)
-    more = [placement(1), placement(11)]
     clicked = tuple(ReflectorClick(TimeNs(s * 10**9), f"c{s}", 1.0, 1.0) for s in (2, 12))
     odd = (*eight, pair("c9", inlier=False))
     agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
-    row = verdict_row(coarse, agreeing, more)
+    row = verdict_row(coarse, agreeing, 1)
     assert (row.early, f"within {error_text(error)}" in str(row.line)) == (True, True)
-    row = verdict_row(coarse, apart, more)
+    row = verdict_row(coarse, apart, 1)
     assert (row.early, PairPart("c9") in row.misfits.parts) == (False, True), "as long as one is set aside it is named"
-    assert not verdict_row(replace(coarse, cause=OF_THE_LENS), agreeing, more).early
-    assert not verdict_row(replace(coarse, error=None, unconfirmed=1), agreeing, more).early
-    assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
+    assert not verdict_row(replace(coarse, cause=OF_THE_LENS), agreeing, 1).early
+    assert not verdict_row(replace(coarse, error=None, unconfirmed=1), agreeing, 1).early
+    assert not verdict_row(coarse, agreeing, 0).early
     doubted = replace(agreeing, outcome=calibration(*eight[:7], replace(eight[7], outlier_probability=0.1)))
-    row = verdict_row(coarse, doubted, more)
+    row = verdict_row(coarse, doubted, 1)
     assert (row.early, row.key) == (False, "")
     assert PairPart("c8") in row.line.parts
     assert (row.kind, row.pairs) == ("ReviewPairs", ("c8",))
