@@ -18,7 +18,9 @@ from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.appearance import Appearance, appearance_of, likeness_elsewhere, with_appearance
+from calib_core.proposing.common_width import CommonWidth, at_width, common_width
 from calib_core.proposing.dwell_views import has_changed
+from calib_core.proposing.proposing import LEAST_CONFIDENCE
 from calib_core.words.outcomes import outcome_remark
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
@@ -61,7 +63,7 @@ def find_proposals(
         options: of the calibration.
         confirmed: clicks that a person placed or accepted; each shows what the reflector looks like.
         placements: where the radar saw something stand still, if that is known already.
-        reflector_m: width of the reflector [m].
+        reflector_m: width of the reflector [m]; without a click, others are tried where nothing is found with it.
         progress: called with what is done next, in words, and while the images are looked at.
         stopped: asked often; once it is true there are no proposals.
 
@@ -70,21 +72,35 @@ def find_proposals(
     """
     if camera is None:
         return Unsolvable("no-camera")
-    if not len(recording.image_times):
-        return Unsolvable("no-frames")
     if placements is None:
         if progress is not None:
             progress("searching the radar scans for placements")
         placements = _placements(recording, options.gating, stopped)
-    if stopped():
-        return _STOPPED
-    missing = _missing(placements, recording)
+    missing = _STOPPED if stopped() else _missing(placements, recording)
     if missing is not None:
         return missing
     views = dwell_views(placements, recording, camera, reflector_m=reflector_m, progress=progress, stopped=stopped)
     if stopped():
         return _STOPPED
-    return proposed_again(views, recording, camera, options, confirmed=confirmed)
+    found = proposed_again(views, recording, camera, options, confirmed=confirmed)
+    if found[1].ranked or any(click.counts for click in confirmed):
+        return found
+    return _at_other_widths(found, recording, camera, options, stopped)
+
+
+def _at_other_widths(
+    found: tuple[tuple[DwellView, ...], Proposals],
+    frames: FrameSource,
+    camera: Camera,
+    options: CalibrationOptions,
+    stopped: Callable[[], bool],
+) -> tuple[tuple[DwellView, ...], Proposals]:
+    """Propose at the width that what changed in the images has in common; what was found before if it may be chance."""
+    width = common_width(found[0], camera, options, stopped=stopped)
+    if width is None or width.probability < LEAST_CONFIDENCE:
+        return found
+    views = tuple(at_width(view, frames, camera, width.reflector_m) for view in found[0])
+    return views, proposals_of(views, camera, options, width=width)
 
 
 def proposed_again(
@@ -189,6 +205,8 @@ def _placements(recording: RecordedFrames, gating: GatingOptions, stopped: Calla
 
 def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unsolvable | None:
     """Say why there can be no proposals; None if there can."""
+    if not len(recording.image_times):
+        return Unsolvable("no-frames")
     if len(placements) < _LEAST_PLACEMENTS:
         return Unsolvable("too-few-placements", {"placements": len(placements), "needed": _LEAST_PLACEMENTS})
     times = recording.image_times
@@ -312,6 +330,7 @@ class ProposingJob:
         self._closed = False
         self._seen: tuple[DwellView, ...] = ()
         self._seen_for: ProposingWish | None = None
+        self._width: CommonWidth | None = None
         self._appearances: tuple[tuple[object, ...], list[Appearance]] = ((), [])
         self._carried: list[DwellView] = []
         self._carried_from: list[tuple[object, ...]] = []
@@ -365,6 +384,7 @@ class ProposingJob:
     def _answer(self, wish: ProposingWish) -> None:
         """Look at the images unless that is done; then propose, and carry what was clicked."""
         if self._seen_for is None or not _same_images(self._seen_for, wish):
+            self._width = None
             self._set(wish, stage="looking", done=0, count=len(wish.placements), problem="", hint="")
             found = find_proposals(
                 self._recording,
@@ -380,7 +400,7 @@ class ProposingJob:
                 said = outcome_remark(found)
                 self._set(wish, Proposals(()), stage="failed", problem=str(said.message), hint=str(said.hint))
                 return
-            self._seen, self._seen_for = found[0], wish
+            self._seen, self._seen_for, self._width = found[0], wish, found[1].width
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
             self._appearances = ((), [])
         self._carry(wish)
@@ -433,7 +453,7 @@ class ProposingJob:
             return
         self._wait()
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
-        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
+        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed, width=self._width)
         self._set(wish, proposals, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:

@@ -11,7 +11,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import candidate_rays
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import mounting_prior
-from calib_core.proposing.pose_agreement import apex_log_odds, chance_score, chance_scores, pose_agreement
+from calib_core.proposing.pose_agreement import chance_score, chance_scores, pose_agreement, reflector_log_odds
 from calib_core.proposing.proposals import Proposal, Proposals
 
 LEAST_WHOLE_CONFIDENCE = 0.9
@@ -69,7 +69,7 @@ def automatic_clicks(
     agreement = pose_agreement(rays, prior)
     if agreement is None:
         return _refused("no-mounting")
-    if apex_log_odds(views, agreement) < 0.0:
+    if reflector_log_odds(views, agreement) < 0.0:
         return _refused("no-apex")
     chance = max(chance_score(chance_scores(rays, prior)), LEAST_SCORE)
     rival = agreement.rival_score + _RIVAL_SHARE * agreement.score

@@ -154,7 +154,7 @@ def candidate_rays(
         sigma_rad=np.maximum(sigma_px, _LEAST_SIGMA_PX) * per_px,
         odds=odds,
         missing=np.maximum(1.0 - odds.sum(axis=1), _LEAST_MISSING),
-        density=_density(pixels, odds, _apart_in_time(views), camera) / per_px**2,
+        density=_density(pixels, odds, apart_in_time(views), camera) / per_px**2,
         click=np.array([[one.click for one in own] for own in padded], dtype=np.int64),
         is_flat=flat,
     )
@@ -239,8 +239,12 @@ def _tangents(rays: np.ndarray) -> np.ndarray:
     return np.stack([right, np.cross(rays, right)], axis=-2)
 
 
-def _apart_in_time(views: Sequence[DwellView]) -> Flags:
-    """Return which dwells (n, n) do not overlap: what stands in one is gone in the other."""
+def apart_in_time(views: Sequence[DwellView]) -> Flags:
+    """Return which dwells (n, n) do not overlap: what stands in one is gone in the other.
+
+    Args:
+        views: of all placements.
+    """
     start = np.array([view.placement.start for view in views], dtype=np.int64)
     end = np.array([view.placement.end for view in views], dtype=np.int64)
     return np.asarray((start[:, None] > end) | (start > end[:, None]))

@@ -112,7 +112,7 @@ def dwell_views(
         while done < len(views) and (len(views) > _SETTLED or number == last):
             if stopped is not None and stopped():
                 break
-            views[done] = _with_candidates(done, views, frames)
+            views[done] = with_seen_apexes(_with_blobs(done, views), frames)
             done += 1
             if progress is not None:
                 progress(ViewProgress(done, len(placements), tuple(views)))
@@ -163,11 +163,28 @@ def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
     return with_blobs(replace(view, change=usual.changes_of(view.stills), change_without=usual.changes_of(without)))
 
 
-def with_blobs(view: DwellView) -> DwellView:
-    """Find the places of the reflector's width among the pixels that changed."""
-    width_px = view.width_px / view.factor
-    response = _response(view.change, view.change_without, width_px)
-    return replace(view, candidates=tuple(_full(blob, view.factor) for blob in blobs(response, width_px)))
+def with_blobs(view: DwellView, *, rough: bool = False) -> DwellView:
+    """Find the places of the reflector's width among the pixels that changed.
+
+    Args:
+        view: with its changes.
+        rough: the strongest only, in images so far reduced that the reflector is still a few pixels wide.
+    """
+    reduced = 1 << int(np.log2(max(view.width_px / view.factor / _ROUGH_PX, 1.0))) if rough else 1
+    factor = view.factor * reduced
+    change, without = (_reduced(changes, reduced) for changes in (view.change, view.change_without))
+    width_px = view.width_px / factor
+    response = _response(change, without, width_px)
+    found = blobs(response, width_px, most=_ROUGH_MOST) if rough else blobs(response, width_px)
+    return replace(view, candidates=tuple(_full(blob, factor) for blob in found))
+
+
+def _reduced(changes: np.ndarray, factor: int) -> np.ndarray:
+    """Return change maps (k, h, w) smaller by a whole factor; rows and columns that are left over at the ends are cut off."""
+    count, height, width = changes.shape
+    height, width = height // factor, width // factor
+    parts = changes[:, : height * factor, : width * factor].reshape(count, height, factor, width, factor)
+    return changes if factor == 1 else parts.mean(axis=(2, 4)).astype(np.uint8)
 
 
 def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
@@ -189,6 +206,29 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
 def has_changed(view: DwellView, pixel_px: Vector2) -> bool:
     """Return whether something of any width changed at a pixel (2,) of the full image."""
     return bool(view.change.size) and bool(_contrast_by_width(view, pixel_px)[1].max() > _LEAST_SIGMAS)
+
+
+def is_upright(view: DwellView, pixel_px: Vector2) -> bool | None:
+    """Return whether what changed at a pixel is as much taller than wide as a person is; None if nothing changed there.
+
+    Args:
+        view: of a dwell.
+        pixel_px: (2,) of the full image.
+    """
+    import cv2
+
+    if not view.change.size:
+        return None
+    changed = (view.change.min(axis=0) > 0.5 * _MOST_SIGMAS * _LEVELS_PER_SIGMA).astype(np.uint8)
+    labels = cv2.connectedComponents(changed)[1]
+    column, row = np.round((np.asarray(pixel_px) + 0.5) / view.factor - 0.5).astype(int).tolist()
+    half = max(1, round(0.5 * view.width_px / view.factor))
+    around = labels[max(0, row - half) : row + half + 1, max(0, column - half) : column + half + 1]
+    if not around.any():
+        return None
+    thing = labels == np.bincount(around[around > 0]).argmax()
+    spans = np.count_nonzero(thing, axis=1)
+    return bool(thing.sum() > _UPRIGHT * np.quantile(spans[spans > 0], _WIDE_ROWS) ** 2)
 
 
 def _contrast_by_width(view: DwellView, pixel_px: Vector2) -> tuple[Values, Values]:
@@ -215,9 +255,13 @@ def _shown_at(view: DwellView, middle: Indices, width_px: float) -> float:
     return float(response[first[1] : last[1], first[0] : last[0]].max(initial=0.0))
 
 
-def _with_candidates(number: int, views: Sequence[DwellView], frames: FrameSource) -> DwellView:
-    """Find what changed, and the apexes there at full resolution."""
-    view = _with_blobs(number, views)
+def with_seen_apexes(view: DwellView, frames: FrameSource) -> DwellView:
+    """Move the candidates of a view to the apexes that full images show there.
+
+    Args:
+        view: of a dwell.
+        frames: of the camera.
+    """
     image = full_image(view.clear, frames) if view.candidates else None
     if image is None:
         return view
@@ -243,6 +287,8 @@ _FLOOR_GREY = 3.0
 _MOST_SIGMAS = 8.0
 """A pixel counts no more than this: a bright one is no better evidence than many."""
 _LEVELS_PER_SIGMA = 30.0
+_ROUGH_PX, _ROUGH_MOST = 3.0, 8
+"""Width of the reflector in the smallest image in which it is looked for, and how many places are kept."""
 _WIDEST, _WIDTHS, _NARROWEST_PX = 6.0, 25, 4.0
 """Widths that are tried at a click: up to so many times what the reflector is thought to be, and down to that; how many."""
 _STANDS_OUT, _LEAST_SIGMAS = 1.5, 1.0
@@ -257,6 +303,9 @@ _NEXT = 1.2
 """How far on both sides of a place a limb goes on, in widths of the reflector."""
 _BODY = (1.6, 3.0)
 """Width and height of what is taken for a body below a head, in widths of the reflector."""
+_UPRIGHT, _WIDE_ROWS = 1.8, 0.9
+"""Area over the square of the width, which nine of ten rows do not exceed: a square has 1, a person of 1.7 m by 0.5 m about 3.
+The threshold is the geometric mean of both."""
 _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
 

@@ -25,7 +25,7 @@ import numpy as np
 from calib_core.arrays import Flags, Indices, Points2, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.proposing.candidate_rays import CandidateRays
-from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.dwell_views import DwellView, is_upright
 from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
 
 NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
@@ -311,18 +311,21 @@ _SAME_RAD, _OTHER_RAD = np.radians(1.2), np.radians(4.0)
 """Between the better half of the rotations that are returned, and between the others."""
 
 
-def rotation_consensus(rays: CandidateRays, prior: MountingPrior, *, most: int = 24, seed: int = 0) -> RoughPoses:
+def rotation_consensus(
+    rays: CandidateRays, prior: MountingPrior, *, most: int = 24, tried: int = _MOST_TRIED, seed: int = 0
+) -> RoughPoses:
     """Find the rotations that explain the most dwells; none if no two dwells agree within the mounting's reach.
 
     Args:
         rays: of all dwells.
         prior: of the mounting.
         most: how many to return.
+        tried: how many to compare at most, about each start.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
     poseses: list[RoughPoses] = []
     for centre in prior.starts_m:
-        rotations = _from_two_dwells(rays, prior, centre, np.random.default_rng(seed))
+        rotations = _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))
         scores = _rotation_scores(rays, prior, centre, rotations)
         kept = _best_apart(rotations, scores, most)
         centres = np.tile(centre, (len(kept), 1))
@@ -343,7 +346,7 @@ def _directions(rays: CandidateRays, centre: np.ndarray) -> np.ndarray:
 
 
 def _from_two_dwells(
-    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, rng: np.random.Generator
+    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, tried: int, rng: np.random.Generator
 ) -> np.ndarray:
     """Return the rotations (h, 3, 3) that two candidates of two dwells give, those within the mounting's reach."""
     directions = _directions(rays, centre)
@@ -367,7 +370,7 @@ def _from_two_dwells(
     )
     cosine = 0.5 * (np.einsum("hij,ij->h", rotations, prior.rotation) - 1.0)
     near = np.flatnonzero(cosine > np.cos(MOST_TURNED_RAD))
-    most = min(_MOST_TRIED, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
+    most = min(tried, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
     if len(near) > most:
         odds = rays.odds[dwell, which]
         likely = odds[one[near]] * odds[other[near]]
@@ -597,35 +600,36 @@ def _deal(rng: np.random.Generator, n: int) -> Indices:
             return np.asarray(rows)
 
 
-_WIDE_ENOUGH_PX = 16.0
-"""Width of a reflector whose apex can be seen."""
-
 _OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
-"""Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
+"""Share of the places with an apex: of reflectors wide enough to show it 0.92 in simulated recordings, of people 0.1 to 0.4."""
+
+_UPRIGHT_PERSON, _UPRIGHT_REFLECTOR = 0.85, 0.15
+"""Share of the places without an apex that are much taller than wide: 23 of 26 people in simulated recordings, and a reflector
+on a stand that is as wide as itself, or one with somebody behind it."""
 
 _BEFORE = 1.0
 """Log-odds before any image: most recordings contain a reflector."""
 
-_LEAST_SEEN = 3
-"""Fewer places of that width say nothing."""
-
 _PRESENT = 0.5
 
 
-def apex_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
-    """Return the log-odds that what stood there is a reflector; infinite where too little is large enough to tell.
+def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
+    """Return the log-odds that what stood there is a reflector and not a person: an apex speaks for it, its lack not
+    against it; infinite where nothing is told.
 
     Args:
         views: as the agreement was found for, without confirmed clicks.
         agreement: its most probable candidates are looked at.
     """
-    log_odds, count = _BEFORE, 0
-    for i, view in enumerate(views):
-        row = int(agreement.likeliest[i])
-        if agreement.probability[i, row] < _PRESENT or not view.width_px >= _WIDE_ENOUGH_PX:
+    log_odds, told = _BEFORE, False
+    for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
+        if probability[row] < _PRESENT:
             continue
-        shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
-        seen = shares if view.candidates[row].has_apex else 1.0 - shares
-        log_odds += float(np.log(seen[0] / seen[1]))
-        count += 1
-    return log_odds if count >= _LEAST_SEEN else float("inf")
+        candidate = view.candidates[row]
+        upright = is_upright(view, candidate.pixel_px)
+        told |= candidate.has_apex or upright is not None
+        if candidate.has_apex:
+            log_odds += float(np.log(_OF_REFLECTOR / _OF_OTHERS))
+        elif upright is not None:
+            log_odds += float(np.log(_UPRIGHT_REFLECTOR / _UPRIGHT_PERSON)) * (1.0 if upright else -1.0)
+    return log_odds if told else float("inf")

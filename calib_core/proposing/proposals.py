@@ -21,6 +21,7 @@ from calib_core.interchange.own.proposal_documents import (
 )
 from calib_core.interchange.syntax.strict_json import builtins_of, json_text
 from calib_core.measurements import TimeNs
+from calib_core.proposing.common_width import CommonWidth
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
 
@@ -62,6 +63,7 @@ class Proposals:
         agreement: share of the placements' weight that agrees on it, 0 to 1.
         rival_agreement: the same for the best pose that differs clearly.
         trials: how many poses were tried.
+        width: of the reflector, where it was found in the images and not given.
     """
 
     ranked: tuple[Proposal, ...]
@@ -70,6 +72,7 @@ class Proposals:
     agreement: float = 0.0
     rival_agreement: float = 0.0
     trials: int = 0
+    width: CommonWidth | None = None
 
 
 @dataclass(frozen=True, slots=True)

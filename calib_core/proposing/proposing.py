@@ -11,14 +11,15 @@ from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
+from calib_core.proposing.common_width import CommonWidth
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     ClicksAgreement,
     PoseAgreement,
-    apex_log_odds,
     clicks_agreement,
     pose_agreement,
+    reflector_log_odds,
 )
 from calib_core.proposing.proposals import Proposal, Proposals
 
@@ -62,6 +63,7 @@ def proposals_of(
     options: CalibrationOptions,
     *,
     confirmed: Sequence[ReflectorClick] = (),
+    width: CommonWidth | None = None,
 ) -> Proposals:
     """Rank what the images show for each dwell; what is probably wrong is not proposed.
 
@@ -70,6 +72,7 @@ def proposals_of(
         camera: the intrinsics.
         options: of the calibration; nominal mounting and measured camera position are used.
         confirmed: clicks that a person placed or accepted so far; each covers its dwell.
+        width: at which the views were looked at, if it was found in them.
     """
     if not views:
         return Proposals(())
@@ -78,7 +81,7 @@ def proposals_of(
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
-    judged = _Judged.of(views, rays, agreement, by_clicks)
+    judged = _Judged.of(views, rays, agreement, by_clicks, 0.0 if width is None else width.probability)
     covered = _clicks_by_dwell(rays, judged, len(clicks))
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
@@ -96,7 +99,7 @@ def proposals_of(
             unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
     if agreement is None:
-        return Proposals(tuple(ranked), tuple(unproposed))
+        return Proposals(tuple(ranked), tuple(unproposed), width=width)
     return Proposals(
         tuple(ranked),
         tuple(unproposed),
@@ -104,6 +107,7 @@ def proposals_of(
         agreement.agreeing(rays),
         agreement.agreeing_with_rival(rays),
         agreement.trials,
+        width,
     )
 
 
@@ -164,14 +168,18 @@ class _Judged:
         rays: CandidateRays,
         agreement: PoseAgreement | None,
         by_clicks: ClicksAgreement | None,
+        by_deals: float,
     ) -> "_Judged":
-        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
+        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say.
+
+        It is trusted by its score, or by what wrong deals reach: `by_deals` is the probability that it is no chance.
+        """
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None:
             above = (agreement.score - (_CHANCE_SCORE if by_clicks is None else _CHANCE_AFTER_CLICK)) / _CHANCE_STEP
-            trusted = agreement.pose_probability * _logistic(above)
+            trusted = agreement.pose_probability * max(_logistic(above), by_deals)
             if by_clicks is None:
-                reflectors = _logistic(apex_log_odds(views, agreement))
+                reflectors = _logistic(reflector_log_odds(views, agreement))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:

@@ -13,7 +13,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing import DwellView, ImageCandidate, ViewProgress
+from calib_core.proposing import DwellView, ImageCandidate, Proposals, ViewProgress
 from cocalib import proposing
 from cocalib.proposing import (
     ProposingJob,
@@ -53,7 +53,7 @@ class Finding:
         assert self.allowed.wait(20)
         if stopped():
             return Unsolvable.reported("stopped", "the search was stopped", "start it again")
-        return self.end or (VIEWS, None)
+        return self.end or (VIEWS, Proposals(()))
 
     def look(self, clicks: Sequence[ReflectorClick], *_: object) -> list[str]:
         return [click.id for click in clicks]

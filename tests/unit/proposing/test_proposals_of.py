@@ -25,6 +25,7 @@ from calib_core.proposing import (
     proposals_of,
 )
 from calib_core.proposing.candidate_rays import candidate_rays
+from calib_core.proposing.common_width import common_width
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
 from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
@@ -317,14 +318,39 @@ def test_wrong_deals_of_the_radar_score_far_below_the_right_one():
 
 
 def test_a_person_who_stands_at_every_placement_is_refused_and_not_proposed():
-    """The radar and the images agree on the mounting, but no apex is seen although a reflector's would be."""
+    """The radar and the images agree on the mounting, but what stands there is upright and shows no apex."""
     drawn = draw_views(1, Drawing(count=10, listed_share=1.0))
-    near = tuple(replace(view, width_px=30.0) for view in drawn.views)
+    near = tuple(_with_upright_thing(view, drawn.pixels[row]) for row, view in enumerate(drawn.views))
     assert not proposals_of(near, CAMERA, OPTIONS).ranked
     found = taken(near)
     assert found.code == "not-confident"
     assert found.facts["why"] == "no-apex"
     assert len(proposals_of(near, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked) >= 8
+
+
+def _with_upright_thing(view: DwellView, pixel_px: np.ndarray) -> DwellView:
+    """Return a view in which a thing of 24 by 80 pixels changed."""
+    change = np.zeros((1, CAMERA.height_px // 8, CAMERA.width_px // 8), np.uint8)
+    column, row = np.maximum(pixel_px / 8.0 - [1, 5], 0).astype(int).tolist()
+    change[:, row : row + 10, column : column + 3] = 240
+    return replace(view, width_px=30.0, factor=8.0, change=change)
+
+
+def test_the_width_is_found_far_beyond_chance_where_images_and_radar_belong_together():
+    own = common_width(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
+    other = common_width(with_images_of(draw_views(4), draw_views(24)), CAMERA, OPTIONS)
+    assert own.probability > 0.9
+    assert other.probability < 0.5
+    assert own.score > max(own.by_chance.max(), other.score) + 5.0
+
+
+def test_without_other_times_chance_is_unknown_and_nothing_is_trusted():
+    views = draw_views(4, Drawing(count=8)).views
+    first = views[0].placement
+    at_once = [replace(view, placement=replace(view.placement, start=first.start, end=first.end)) for view in views]
+    found = common_width(at_once, CAMERA, OPTIONS)
+    assert not len(found.by_chance)
+    assert found.probability == 0.0
 
 
 def test_apexes_where_the_reflector_is_large_confirm_it():
