@@ -261,6 +261,7 @@ export interface View {
   pose_assumed: Figure[];
   assumptions: AssumptionRow[];
   dismissed: DismissedPlacement[];
+  reviewed: string[];
   acknowledged: string[];
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
@@ -610,18 +611,11 @@ export interface PairCandidates {
 /** What a review shows of one pair beyond its row; written as an array. */
 export type ReviewRow = [id: string, influence: number | null, held_out_px: number | null, sigmas: number | null];
 
-/** The bins of a histogram of residual lengths. */
-export interface ResidualHistogram {
-  edges_px: number[];
-  expected: number[];
-}
-
 /** The review of all pairs of an answer. */
 export interface Review {
   type: "review";
   revision: number;
   rows: ReviewRow[];
-  histogram: ResidualHistogram | null;
   words: Words;
 }
 
@@ -929,6 +923,14 @@ export interface PlacementDismissed {
   request?: number;
 }
 
+/** A person has looked at these clicks and leaves them as they are, or wants to look again. */
+export interface MarksReviewed {
+  type: "marks_reviewed";
+  ids: string[];
+  reviewed?: boolean;
+  request?: number;
+}
+
 /** The user has read the warnings of these codes, or wants to see them again. Not undone with clicks. */
 export interface WarningsAcknowledged {
   type: "warnings_acknowledged";
@@ -1232,6 +1234,7 @@ export type FromPage =
   | ClickExcluded
   | ReturnChosen
   | PlacementDismissed
+  | MarksReviewed
   | WarningsAcknowledged
   | OptionsChanged
   | Cleared

@@ -10,7 +10,7 @@ import { hideTip, make, showTip } from "../base/notices.js";
 /** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */
 /** @typedef {{label: string, low: number, high: number}} Axis */
 /** @typedef {{marks: Mark[], x: Axis, y: Axis, bar: number, curve: [number, number][], limit: number|null, empty: string}} Content */
-/** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void}} Listener */
+/** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void, line?: (value: number) => void}} Listener */
 /** What is highlighted in all plots. @typedef {{hovered: Set<string>, brushed: Set<string>, selected: string|null}} Highlight */
 
 const COLOURS = ["accent", "accent-soft", "attention", "ink", "line", "line-strong", "muted"];
@@ -192,7 +192,7 @@ export class Plot {
 
   /** The region that is being selected. */
   drawPress() {
-    if (!this.press) return;
+    if (!this.press || this.listener.line) return;
     const { x, y, toX, toY } = this.press;
     this.pen.strokeStyle = this.colour.accent;
     this.pen.fillStyle = this.colour["accent-soft"];
@@ -233,7 +233,15 @@ export class Plot {
       return this.listener.hover(mark);
     }
     [this.press.toX, this.press.toY] = at(event);
+    if (this.listener.line) return this.listener.line(this.valueAt(this.press.toY));
     this.draw();
+  }
+
+  /** The value at a height. @param {number} y px of the plot */
+  valueAt(y) {
+    const { low, high } = this.content.y;
+    const floor = this.size[1] - EDGE.bottom;
+    return Math.max(low, Math.min(high, low + ((floor - y) / (floor - EDGE.top)) * (high - low)));
   }
 
   leave() {
@@ -257,7 +265,7 @@ export class Plot {
     const [x, y] = at(event);
     const [left, right] = [Math.min(done.x, x), Math.max(done.x, x)];
     const [top, bottom] = [Math.min(done.y, y), Math.max(done.y, y)];
-    if (Math.max(right - left, bottom - top) > THRESHOLD) return this.listener.brush(this.inside(left, right, top, bottom));
+    if (Math.max(right - left, bottom - top) > THRESHOLD) return this.listener.line ? undefined : this.listener.brush(this.inside(left, right, top, bottom));
     const mark = this.near(event);
     if (mark) this.listener.go(mark);
     else this.listener.brush([]);
@@ -276,6 +284,12 @@ export class Plot {
   typed(event) {
     const marks = this.ordered.filter((mark) => mark.ids.length);
     const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    const { limit, y } = this.content;
+    if (this.listener.line && limit !== null && /^Arrow(Up|Down)$/.test(event.key)) {
+      event.preventDefault();
+      this.content.limit = Math.max(0, Math.min(y.high, limit + 0.02 * y.high * (step ?? 0)));
+      return this.listener.line(this.content.limit);
+    }
     if (step && marks.length) {
       this.at = this.at < 0 ? (step > 0 ? 0 : marks.length - 1) : (this.at + step + marks.length) % marks.length;
       this.listener.hover(marks[this.at]);

@@ -1,4 +1,4 @@
-/** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
+/** The review of all pairs: their residuals as bars over a contact sheet, linked plots, and why the selected pair uses its return. */
 
 import { register, withImages } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
@@ -7,6 +7,7 @@ import { tell } from "../base/socket.js";
 import { clicks, nameOf, on, said, select, state } from "../base/state.js";
 import { comeTo } from "../image/arriving.js";
 import { Plot } from "./plots.js";
+import { contactSheet, drawSheet, markSheet, nextUnreviewed } from "./sheet.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** @typedef {import("../messages.js").Review} Review */
@@ -34,12 +35,10 @@ const PARTS = [
 const AGAINST = [
   ["range", "Residual against range", "range [m]", (row) => row.click.range_m],
   ["azimuth", "Residual against azimuth", "azimuth, left positive [°]", (row) => row.click.azimuth_deg],
-  ["column", "Residual against image column", "column [px]", (row) => row.click.u_px],
-  ["row", "Residual against image row", "row [px]", (row) => row.click.v_px],
   ["time", "Residual against time", "time [s]", (row) => state.seconds[row.click.frame] ?? null],
 ];
 
-const shown = { kinds: new Set(KINDS.map(([kind]) => kind)), low: 0, high: Infinity, part: /** @type {(typeof PARTS)[number][0]} */ ("length") };
+const shown = { kinds: new Set(KINDS.map(([kind]) => kind)), low: 0, high: Infinity, line: /** @type {number|null} */ (null), part: /** @type {(typeof PARTS)[number][0]} */ ("length") };
 /** @type {import("./plots.js").Highlight} */
 const highlight = { hovered: new Set(), brushed: new Set(), selected: null };
 /** @type {Review|null} */
@@ -58,22 +57,32 @@ const filters = make("div", "review-filters", []);
 const grid = make("div", "review-plots", []);
 const readout = make("div", "review-readout", "");
 const wordsLine = make("p", "review-words", "");
-const why = make("section", "review-pair", []);
+const pairBox = make("section", "review-pair", []);
+const why = make("details", "review-why", [make("summary", "", "Why"), wordsLine, pairBox]);
+const bars = new Plot("residuals", "Residuals", { hover: hovered, go, brush, line: (value) => change(() => (shown.line = value)) });
+const left = make("span", "", "");
+const next = make("button", "second", "Next");
 
 export function startReview() {
-  register({ id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withImages });
+  register({ id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals contact sheet review rms cdsd a b", run: () => showPage("check"), when: withImages });
   readout.id = "review-readout";
   readout.setAttribute("aria-live", "polite");
   const listener = { hover: hovered, go, brush };
-  for (const [key, title] of [["histogram", "Residual lengths"], ...AGAINST, ["influence", "Influence of each pair"]]) {
+  plots.set("residuals", bars);
+  for (const [key, title] of AGAINST) {
     const plot = new Plot(key, title, listener);
     plots.set(key, plot);
     grid.append(make("figure", "", [make("figcaption", "", title), plot.canvas]));
   }
-  why.setAttribute("aria-label", "The selected pair");
-  page.append(filters, wordsLine, grid, readout, why);
+  pairBox.setAttribute("aria-label", "The selected pair");
+  next.dataset.hint = "The next mark above the line that nobody has looked at (R says that you have)";
+  next.onclick = () => void nextUnreviewed(above());
+  const overview = make("section", "review-marks", [make("div", "to-review", [left, next]), bars.canvas, contactSheet((id) => go({ ids: [id] }))]);
+  check.prepend(overview);
+  page.append(filters, grid, readout, why);
   drawFilters();
-  new ResizeObserver(() => visible() && drawPlots()).observe(grid);
+  const observer = new ResizeObserver(() => visible() && redraw());
+  for (const plot of plots.values()) observer.observe(plot.canvas);
   on(["view", "selected", "theme", "recording"], refresh);
   on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the image is moved
   on(["connection"], () => {
@@ -119,8 +128,29 @@ function drawAll() {
   highlight.selected = state.selected;
   wordsLine.textContent = review ? said(review.words) : "";
   drawFilters();
+  drawMarks();
   drawPlots();
   drawPair();
+}
+
+/** The marks above the line. */
+const above = () => new Set(rows().filter((row) => row.length >= line()).map((row) => row.click.id));
+
+/** Residuals above it are to be reviewed [px]. */
+const line = () => shown.line ?? state.view?.residual_limit_px ?? Infinity;
+
+/** The bars and the contact sheet, the longest residual first; the line marks, and excludes nothing. */
+function drawMarks() {
+  const worst = rows().sort((a, b) => b.length - a.length);
+  const marked = above();
+  const reviewed = state.view?.reviewed ?? [];
+  const open = worst.filter(({ click, kind }) => marked.has(click.id) && kind !== "excluded" && !reviewed.includes(click.id)).length;
+  left.textContent = worst.length ? `${marked.size} of ${worst.length} above ${Number.isFinite(line()) ? digits(line()) : "–"} px, ${open} to review` : "No marks to review yet";
+  next.disabled = !open;
+  const marks = worst.map((row, index) => ({ ids: [row.click.id], x: index + 0.5, y: row.length, kind: /** @type {Kind} */ (marked.has(row.click.id) ? "outlier" : row.kind), text: told(row) }));
+  const high = 1.08 * Math.max(1, ...marks.map((mark) => mark.y));
+  bars.show({ marks, x: { label: "marks; drag the line", low: 0, high: Math.max(1, worst.length) }, y: { label: "residual [px]", low: 0, high }, bar: 1, curve: [], limit: Number.isFinite(line()) ? Math.min(line(), high) : null, empty: EMPTY }, highlight);
+  drawSheet(worst, marked, highlight);
 }
 
 /** All pairs with a reprojection, in order of time. @returns {Row[]} */
@@ -202,32 +232,10 @@ function change(what) {
 
 function drawPlots() {
   const drawn = rows().filter(passes);
-  plots.get("histogram")?.show(histogram(drawn), highlight);
   for (const [key, , label, at] of AGAINST) plots.get(key)?.show(scatter(drawn, label, at), highlight);
-  plots.get("influence")?.show(influences(drawn), highlight);
 }
 
 const EMPTY = "no clicks to show";
-
-/** How many residuals of each length, and how many the noise model expects. @param {Row[]} drawn @returns {Content} */
-function histogram(drawn) {
-  const { edges_px: edges, expected } = review?.histogram ?? { edges_px: [0, 1], expected: [] };
-  const width = edges[1] - edges[0];
-  const last = edges[edges.length - 1];
-  const judged = drawn.filter((row) => row.kind === "agreeing" || row.kind === "outlier");
-  const agreeing = judged.filter((row) => row.kind === "agreeing").length;
-  const bins = [...edges.slice(0, -1), last].map((edge, index) => {
-    const inside = judged.filter((row) => row.length >= edge && (edge === last || row.length < edge + width));
-    const between = edge === last ? `longer than ${digits(last)} px` : `from ${digits(edge)} to ${digits(edge + width)} px`;
-    const model = expected[index] === undefined ? "" : `, ${digits(expected[index] * agreeing)} expected`;
-    const kind = /** @type {Kind} */ (edge === last ? "outlier" : "agreeing");
-    return { ids: inside.map((row) => row.click.id), x: edge + width / 2, y: inside.length, kind, text: `${count(inside.length)} ${between}${model}` };
-  });
-  const curve = expected.map((share, index) => /** @type {[number, number]} */ ([edges[index] + width / 2, share * agreeing]));
-  const high = Math.max(1, ...bins.map((bin) => bin.y), ...curve.map(([, y]) => y)) * 1.08;
-  const axis = { label: curve.length ? "residual [px]; line: expected" : "residual [px]", low: 0, high: last + width };
-  return { marks: review?.histogram ? bins : [], x: axis, y: { label: "clicks", low: 0, high }, bar: width, curve, limit: null, empty: EMPTY };
-}
 
 /** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @returns {Content} */
 function scatter(drawn, label, at) {
@@ -237,14 +245,6 @@ function scatter(drawn, label, at) {
   const most = 1.12 * Math.max(1e-3, ...(usual.length ? usual : drawn.map((row) => Math.abs(row[shown.part]))));
   const y = { label: `${shown.part === "length" ? "residual" : `residual ${shown.part}`} [px]`, low: shown.part === "length" ? 0 : -most, high: most };
   return { marks, x: { label, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, curve: [], limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
-}
-
-/** @param {Row[]} drawn @returns {Content} */
-function influences(drawn) {
-  const known = drawn.filter((row) => row.influence !== null);
-  const marks = known.map((row) => ({ ids: [row.click.id], x: row.order, y: Number(row.influence), kind: row.kind, text: told(row) }));
-  const high = 1.12 * Math.max(0.1, ...marks.map((mark) => mark.y));
-  return { marks, x: { label: "pair, in order of time", ...spread(marks.map((mark) => mark.x)) }, y: { label: "pose moves without it [σ]", low: 0, high }, bar: 0, curve: [], limit: null, empty: "this method states none" };
 }
 
 /** @param {Mark|null} mark */
@@ -265,7 +265,7 @@ function brush(ids) {
   redraw();
 }
 
-/** Go to a pair; of several, to the one with the longest residual, and mark the others. @param {Mark} mark */
+/** Go to a pair; of several, to the one with the longest residual, and mark the others. @param {{ids: string[]}} mark */
 function go(mark) {
   const met = clicks().filter((click) => mark.ids.includes(click.id)).sort((a, b) => (b.residual_px ?? 0) - (a.residual_px ?? 0));
   if (!met.length) return;
@@ -276,14 +276,15 @@ function go(mark) {
 
 function redraw() {
   for (const plot of plots.values()) plot.draw();
+  markSheet(highlight);
 }
 
 /** Which return the selected pair uses, and why. */
 function drawPair() {
-  why.hidden = !state.selected;
+  pairBox.hidden = !state.selected;
   if (!state.selected) return;
-  if (pair?.id !== state.selected) return why.replaceChildren(make("h2", "", state.selected));
-  why.replaceChildren(...pairParts(pair));
+  if (pair?.id !== state.selected) return pairBox.replaceChildren(make("h2", "", state.selected));
+  pairBox.replaceChildren(...pairParts(pair));
 }
 
 /** @param {import("../messages.js").PairReview} pair @returns {HTMLElement[]} */

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright.sync_api import expect
 
 from calib_core.measurements import ReflectorClick, time_from_parts
 from cocalib.cli import run
@@ -83,24 +84,59 @@ def printed(calibration: Path, against: Path) -> list[str]:
     return [line for line in told if line.startswith(("rotation:", "camera position:", "at ", "overall:", "change:"))]
 
 
+def test_all_marks_are_on_one_sheet_the_worst_first_and_a_line_selects_those_to_review(reviewing: Driver) -> None:
+    page = reviewing
+    cells = page.page.locator(".sheet .crop")
+    expect(cells).to_have_count(20)
+    assert cells.first.get_attribute("data-id") == "c7"
+    page.until("document.querySelector('.sheet img').naturalWidth === 96")
+    lengths = page.value(
+        "[...document.querySelectorAll('.sheet .crop')].map((cell) => parseFloat(cell.innerText.split(' ')[1]))"
+    )
+    assert lengths == sorted(lengths, reverse=True)
+    before = page.view["clicks"]
+
+    page.page.focus("[data-plot=residuals]")
+    for _ in range(45):
+        page.page.keyboard.press("ArrowDown")
+    page.until("document.querySelectorAll('.sheet .marked').length > 3")
+    assert page.view["clicks"] == before, "the line excludes nothing"
+    page.page.click(".to-review button")
+    expect(cells.first).to_be_focused()
+    page.press("r")
+    page.until("__cocalib.state.view.reviewed.length === 1")
+    assert page.view["reviewed"] == ["c7"]
+    page.page.click(".to-review button")
+    second = page.value("document.activeElement.dataset.id")
+    assert second != "c7"
+    page.press("x")
+    page.until(f"__cocalib.state.view.clicks.find((click) => click.id === '{second}').state === 'excluded'")
+    page.press("Control+z", "Control+z")
+    page.until("__cocalib.state.view.reviewed.length === 0")
+    page.page.focus(".sheet .crop[data-id=c7]")
+    page.press("Enter")
+    page.until("__cocalib.state.selected === 'c7' && __cocalib.state.shown.index === __cocalib.state.cursor")
+
+
 def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_labelled(
     reviewing: Driver, truth: Any
 ) -> None:
     page = reviewing
     page.page.click("#panel-large")
-    at = on_plot(page, "column", "c3")
+    at = on_plot(page, "azimuth", "c3")
     page.page.mouse.move(5, 5)
-    quiet = {plot: image_of(page, f"[data-plot={plot}]") for plot in ("range", "influence", "histogram")}
+    quiet = {plot: image_of(page, f"[data-plot={plot}]") for plot in ("range", "residuals")}
     page.page.mouse.move(*at)
     page.until("document.getElementById('review-readout').textContent.startsWith('3: ')")
     assert all(image_of(page, f"[data-plot={plot}]") != quiet[plot] for plot in quiet)
     page.page.mouse.move(5, 5)
     page.until("document.getElementById('review-readout').textContent === ''")
-    assert all(image_of(page, f"[data-plot={plot}]") == quiet[plot] for plot in quiet)
+    assert {plot: image_of(page, f"[data-plot={plot}]") == quiet[plot] for plot in quiet} == dict.fromkeys(quiet, True)
 
     page.page.mouse.click(*on_plot(page, "range", "c5"))
     page.until("__cocalib.state.selected === 'c5'")
     assert page.value("__cocalib.state.cursor") == page.frame_at(truth["placements"][4]["best_image_time"])
+    page.page.click(".review-why summary")
     page.until("document.querySelector('.review-pair h2').textContent === 'Pair 5'")
     assert "6.41 m return" in page.text(".review-pair")
     assert page.page.locator(".review-candidates tbody tr").count() > 1

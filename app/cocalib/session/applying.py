@@ -23,6 +23,7 @@ from cocalib.session.events import (
     ClicksImported,
     ColumnsMapped,
     IntrinsicsChosen,
+    MarksReviewed,
     OptionsChanged,
     PlacementDismissed,
     Redo,
@@ -35,7 +36,7 @@ from cocalib.session.events import (
 )
 from cocalib.session.state import ChosenIntrinsics, DismissedPlacement, RecordingFacts, Session
 
-_Aside: TypeAlias = ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged | PlacementDismissed
+_Aside: TypeAlias = ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged | PlacementDismissed | MarksReviewed
 """Events that no pose depends on."""
 
 
@@ -59,7 +60,9 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     changed = _apply_event(event, session, facts)
     if (changed.clicks, changed.options, changed.intrinsics) == (session.clicks, session.options, session.intrinsics):
         return session
-    return replace(changed, revision=session.revision + 1)
+    unchanged = {click.id for click in changed.clicks if click in session.clicks}
+    reviewed = tuple(one for one in changed.reviewed if one in unchanged)
+    return replace(changed, reviewed=reviewed, revision=session.revision + 1)
 
 
 def _with_answer(event: Solved, session: Session) -> Session:
@@ -83,6 +86,11 @@ def _keep_answer(event: _Aside, session: Session) -> Session:
         return _acknowledged(event, session)
     if isinstance(event, PlacementDismissed):
         return _dismissed(event, session)
+    if isinstance(event, MarksReviewed):
+        others = tuple(one for one in session.reviewed if one not in event.ids)
+        known = tuple(click.id for click in session.clicks if click.id in event.ids)
+        reviewed = (*others, *known) if event.reviewed else others
+        return session if set(reviewed) == set(session.reviewed) else replace(session, reviewed=reviewed)
     if isinstance(event, ColumnsMapped):
         return session if event.column_map == session.column_map else replace(session, column_map=event.column_map)
     confirmed = tuple(dict.fromkeys((*session.confirmed, *event.texts)))

@@ -84,6 +84,13 @@ class PlacementDismissed(_Journalled, frozen=True):
     dismissed: bool = True
 
 
+class MarksReviewed(_Journalled, frozen=True):
+    """A person has looked at these clicks and leaves them as they are, or wants to look again."""
+
+    ids: Annotated[tuple[Id, ...], Meta(max_length=10_000)]
+    reviewed: bool = True
+
+
 class WarningsAcknowledged(_Journalled, frozen=True):
     """The user has read the warnings of these codes, or wants to see them again. Not undone with clicks."""
 
@@ -170,6 +177,7 @@ JournalStep: TypeAlias = (
     | ClickExcluded
     | ReturnChosen
     | PlacementDismissed
+    | MarksReviewed
     | WarningsAcknowledged
     | OptionsChanged
     | Cleared

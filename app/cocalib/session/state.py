@@ -168,6 +168,7 @@ class Session:
         column_map: the values of --map that the recording is read with; remembered for the next opening.
         confirmed: texts of the assumptions about the recording that the user has confirmed.
         dismissed: placements that are not the reflector.
+        reviewed: ids of the clicks that a person has looked at and left as they are.
         acknowledged: codes of the warnings that the user has read.
         intrinsics: chosen for this session; None to use those that it was opened with.
     """
@@ -183,6 +184,7 @@ class Session:
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
+    reviewed: tuple[str, ...] = ()
     acknowledged: tuple[str, ...] = ()
     intrinsics: ChosenIntrinsics | None = None
 

@@ -118,6 +118,7 @@ def view(
         verdict=verdict_row(verdict, session, left),
         placements=states,
         dismissed=session.dismissed,
+        reviewed=session.reviewed,
         acknowledged=session.acknowledged,
     )
 

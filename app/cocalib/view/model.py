@@ -271,6 +271,7 @@ class View:
         assumptions: what the recording does not state, reading it takes for granted, and nobody has confirmed.
         verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
+        reviewed: ids of the clicks that the user has looked at and left as they are.
         acknowledged: the codes of the warnings that the user has read.
         placements: what became of each placement that was found in the radar data.
     """
@@ -297,6 +298,7 @@ class View:
     pose_assumed: tuple[Figure, ...] = ()
     assumptions: tuple[AssumptionRow, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
+    reviewed: tuple[str, ...] = ()
     acknowledged: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = _UNCLICKED

@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 
 from calib_core.arrays import Values
-from calib_core.estimation.pair_results import expected_shares
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.check.agreement import compare
 from calib_core.interchange.format import ImportedCalibration, imported
@@ -21,9 +20,6 @@ from calib_core.words.text import Words, join, named, say, words
 from cocalib.session.applying import History
 from cocalib.view.model import Figure
 from cocalib.view.wording import direction_words, plain, sentence
-
-_FEWEST_BINS, _MOST_BINS = 8, 24
-_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
 class ReviewRow(msgspec.Struct, frozen=True, array_like=True):
@@ -43,44 +39,29 @@ class ReviewRow(msgspec.Struct, frozen=True, array_like=True):
 
 
 @dataclass(frozen=True, slots=True)
-class ResidualHistogram:
-    """The bins of a histogram of residual lengths.
-
-    Attributes:
-        edges_px: of the bins, ascending; longer residuals belong to one more bin after the last.
-        expected: share of the agreeing pairs in each bin according to the noise model; empty without one.
-    """
-
-    edges_px: tuple[float, ...]
-    expected: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Review:
     """The review of all pairs of an answer.
 
     Attributes:
         revision: of the session that the answer belongs to.
         rows: one per pair with a radar position.
-        histogram: of the residuals' lengths; None without pairs.
         words: how the residuals compare with the noise model, and which pair the pose leans on most.
     """
 
     revision: int
     rows: tuple[ReviewRow, ...]
-    histogram: ResidualHistogram | None
     words: Words
 
 
 def review_of(calibration: Calibration | None, revision: int) -> Review:
     """Return the review of an answer; an empty one without a calibration."""
     if calibration is None or not calibration.pairs:
-        return Review(revision, (), None, words("Available after the first calibration."))
+        return Review(revision, (), words("Available after the first calibration."))
     rows = tuple(
         ReviewRow(pair.id, _rounded(pair.influence, 3), _rounded(pair.held_out_px, 2), _rounded(sigmas, 3))
         for pair, sigmas in zip(calibration.pairs, _sigmas(calibration).tolist(), strict=True)
     )
-    return Review(revision, rows, _histogram(calibration), _words(calibration))
+    return Review(revision, rows, _words(calibration))
 
 
 def _rounded(value: float, digits: int) -> float | None:
@@ -96,27 +77,6 @@ def _sigmas(calibration: Calibration) -> Values:
     whitened = np.linalg.solve(covariances[known], residuals[known][:, :, None])[:, :, 0]
     sigmas[known] = np.sqrt((whitened * residuals[known]).sum(axis=1))
     return sigmas
-
-
-def _histogram(calibration: Calibration) -> ResidualHistogram | None:
-    agreeing = [pair for pair in calibration.pairs if pair.inlier and np.isfinite(pair.distance_px)]
-    if not agreeing:
-        return None
-    edges_px = _edges(np.array([pair.distance_px for pair in agreeing]))
-    covariances = np.array([pair.expected_covariance_px2 for pair in agreeing])
-    if not np.isfinite(covariances).all():
-        return ResidualHistogram(tuple(edges_px.tolist()), ())
-    shares = expected_shares(covariances, edges_px)
-    return ResidualHistogram(tuple(edges_px.tolist()), tuple(np.round(shares, 5).tolist()))
-
-
-def _edges(distances_px: Values) -> Values:
-    """Return edges at round numbers from 0 to beyond the longest, with about sqrt(n) bins, and at least eight."""
-    wanted = float(np.clip(2.0 * np.sqrt(len(distances_px)), _FEWEST_BINS, _MOST_BINS))
-    longest_px = max(float(distances_px.max()), 1e-3)
-    power = 10.0 ** np.floor(np.log10(longest_px / wanted))
-    width_px = next(step * power for step in _STEPS if longest_px / (step * power) <= wanted)
-    return np.asarray(np.arange(np.ceil(longest_px / width_px) + 1) * width_px)
 
 
 def _words(calibration: Calibration) -> Words:

@@ -204,6 +204,27 @@ def _decoded(data: bytes, shrink: int) -> np.ndarray:
     return np.asarray(pixels)
 
 
+CROP_PX = 96
+"""Side of the cut-out of a mark on the contact sheet."""
+
+
+def crop(data: bytes, u_px: float, v_px: float, side_px: int) -> bytes:
+    """Return the square of an image around a pixel as a small JPEG.
+
+    Args:
+        data: of the recorded image.
+        u_px: column of the middle.
+        v_px: row of the middle.
+        side_px: of the square in the image; more than `CROP_PX` is shrunk to it.
+    """
+    import cv2
+
+    square = cv2.getRectSubPix(_decoded(data, 1), (side_px, side_px), (u_px, v_px))
+    if side_px > CROP_PX:
+        square = cv2.resize(square, (CROP_PX, CROP_PX), interpolation=cv2.INTER_AREA)
+    return _encoded(square, 85)
+
+
 def _encoded(pixels: np.ndarray, quality: int) -> bytes:
     import cv2
 

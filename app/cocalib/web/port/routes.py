@@ -33,6 +33,7 @@ from cocalib.web.channel.lens import LensService
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.exports import FieldError, format_rows, image_of
+from cocalib.web.frames import crop
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
 
@@ -69,6 +70,7 @@ _LANDING = (
     b'<p><a href="/">Open the page</a>'
 )
 _PAGE = "index.html"
+_CROP = re.compile(r"time=([0-9]{1,19})&u=(-?[0-9]{1,5}(?:\.[0-9]+)?)&v=(-?[0-9]{1,5}(?:\.[0-9]+)?)&side=([0-9]{1,3})")
 _INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 _IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["'](\.\.?/[a-z0-9_./]+\.js)["']""", re.MULTILINE)
@@ -205,6 +207,7 @@ class _Downloads:
             "/api/board_corners.json": self._board_corners,
             "/api/image_changes.json": self._image_changes,
             "/api/check_point_image": self._check_point_image,
+            "/api/crop.jpg": self._crop,
             "/api/meanings.json": self._meanings,
             "/api/meaning.jpg": self._meaning,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
@@ -259,6 +262,21 @@ class _Downloads:
             return _reply(image.data, _IMAGE_TYPES[image.format], more=(("Cache-Control", "no-store"),))
 
         return self._of_calibration(make)
+
+    def _crop(self, query: str) -> Reply:
+        """Return the cut-out of a mark: `time=NANOSECONDS&u=COLUMN&v=ROW&side=PIXELS`."""
+        match = _CROP.fullmatch(query)
+        if match is None:
+            return refusal(400, "Name the frame's stamp, the pixel and the side.")
+        times, stamp = self._recording.image_times, int(match[1])
+        index = int(np.searchsorted(times, stamp))
+        if not 0 <= index < len(times) or times[index] != stamp:
+            return refusal(404, "No image has this stamp.")
+        try:
+            made = crop(self._recording.image_bytes(index).data, float(match[2]), float(match[3]), int(match[4]))
+        except ValueError as error:
+            return refusal(404, str(error))
+        return _reply(made, "image/jpeg", more=(("Cache-Control", "private, max-age=604800, immutable"),))
 
     def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
         """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""

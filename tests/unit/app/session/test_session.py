@@ -20,6 +20,7 @@ from cocalib.session.events import (
     ClickRemoved,
     ClicksImported,
     IntrinsicsChosen,
+    MarksReviewed,
     OptionsChanged,
     PlacementDismissed,
     Redo,
@@ -114,6 +115,18 @@ def test_a_dismissed_placement_comes_back_by_undo_and_leaves_the_answer_valid():
     present = advance(history, Undo(), FACTS).present
     assert (present.dismissed, present.is_solved) == ((), True)
     assert apply(present, PlacementDismissed(TIMES[3], (5.0, 0.0, 0.0), dismissed=False), FACTS) is present
+
+
+def test_a_mark_is_reviewed_until_it_changes_and_the_answer_stays():
+    reviewed = history_of(place(1), place(2), MarksReviewed(("c1", "c2", "c9")))
+    assert set(reviewed.present.reviewed) == {"c1", "c2"}
+    assert reviewed.present.revision == history_of(place(1), place(2)).present.revision
+    assert advance(reviewed, MarksReviewed(("c1",)), FACTS) is reviewed
+    assert advance(reviewed, MarksReviewed(("c1",), reviewed=False), FACTS).present.reviewed == ("c2",)
+    moved = advance(reviewed, ClickMoved("c1", (30.0, 40.0)), FACTS)
+    assert moved.present.reviewed == ("c2",)
+    assert set(advance(moved, Undo(), FACTS).present.reviewed) == {"c1", "c2"}
+    assert advance(advance(moved, Undo(), FACTS), Undo(), FACTS).present.reviewed == ()
 
 
 def test_acknowledged_warnings_stay_so_when_clicks_are_undone():

@@ -55,23 +55,11 @@ def test_held_out_distances_give_the_held_out_metric(solved):
     assert mean_px == pytest.approx(solved.metrics.held_out_aed_px, abs=0.01)
 
 
-def test_the_histogram_covers_the_agreeing_pairs_and_expects_all_of_them(solved):
-    review = review_of(solved, 3)
-    assert review.histogram is not None
-    longest_px = max(pair.distance_px for pair in solved.pairs if pair.inlier)
-
-    assert review.histogram.edges_px[-1] >= longest_px
-    assert len(review.histogram.expected) == len(review.histogram.edges_px) - 1
-    assert 0.5 < sum(review.histogram.expected) <= 1.0
-    assert "95 % ellipse" in str(review.words)
-
-
 def test_without_noise_model_nothing_is_expected(solved):
     unknown = np.full((2, 2), np.nan)
     pairs = tuple(replace(pair, expected_covariance_px2=unknown) for pair in solved.pairs)
     review = review_of(replace(solved, pairs=pairs), 3)
 
-    assert review.histogram.expected == ()
     assert all(row.sigmas is None for row in review.rows)
     assert review_of(None, -1).rows == ()
 

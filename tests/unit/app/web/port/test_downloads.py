@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -110,6 +111,22 @@ def test_a_refused_field_is_named_and_a_name_in_the_address_is_written(file, ask
     assert refused["field"] == "frames"
     assert "radar frame" in refused["reason"]
     assert json.loads(ask(Session(), "/api/preview/tf2").body)["field"] is None
+
+
+def test_the_cut_out_of_a_mark_is_centred_on_it_and_small_however_long_the_residual(ask):
+    image = np.full((400, 500, 3), 20, dtype=np.uint8)
+    image[199:202, 299:302] = 255
+    recording = ImageRecording([image])
+    stamp = int(recording.image_times[0])
+    for side in (96, 300):
+        reply = ask(Session(), f"/api/crop.jpg?time={stamp}&u=300.00&v=200.00&side={side}", recording)
+        made = cv2.imdecode(np.frombuffer(reply.body, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
+        assert made.shape == (96, 96)
+        brightest = np.unravel_index(int(np.argmax(made)), made.shape)
+        np.testing.assert_allclose(brightest, 47.5, atol=2)
+    assert ask(Session(), f"/api/crop.jpg?time={stamp}&u=-5.0&v=399.9&side=96", recording).status == 200
+    assert ask(Session(), f"/api/crop.jpg?time={stamp + 1}&u=3&v=4&side=96", recording).status == 404
+    assert ask(Session(), f"/api/crop.jpg?time={stamp}&u=3&v=4&side=9999", recording).status == 400
 
 
 def test_the_image_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, ask):

@@ -1,0 +1,124 @@
+/**
+ * The contact sheet of the page Check: a cut-out of every mark with its reprojection, the longest residual first. Arrows walk through it,
+ * Enter goes to the mark, X leaves it out or takes it in again, R says that it was looked at.
+ */
+
+import { make, shape, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { nameOf, stampOf, state } from "../base/state.js";
+
+/** @typedef {import("./review.js").Row} Row */
+/** Side of a cut-out [px of the image]; of a longer residual so many times its length. */
+const [SIDE, MOST, WIDER] = [96, 900, 2.4];
+const KEYS = "ArrowLeft ArrowRight ArrowUp ArrowDown Home End Enter x X r R";
+
+/** @type {Map<string, HTMLButtonElement>} */
+const cells = new Map();
+/** @type {(id: string) => void} */
+let arrive = () => {};
+const sheet = make("div", "sheet", []);
+
+/** @param {(id: string) => void} go Goes to a click. */
+export function contactSheet(go) {
+  arrive = go;
+  sheet.setAttribute("role", "group");
+  sheet.setAttribute("aria-label", "All marks, the longest residual first");
+  sheet.addEventListener("keydown", pressed);
+  sheet.addEventListener("focusin", (event) => rove(/** @type {HTMLElement} */ (event.target)));
+  return sheet;
+}
+
+/** Draw the marks in this order; cut-outs that are there stay. @param {Row[]} rows @param {Set<string>} marked @param {import("./plots.js").Highlight} highlight */
+export function drawSheet(rows, marked, highlight) {
+  const reviewed = new Set(state.view?.reviewed ?? []);
+  const known = new Set(rows.map((row) => row.click.id));
+  for (const id of [...cells.keys()]) if (!known.has(id)) cells.delete(id);
+  const shown = rows.map((row) => {
+    const { id } = row.click;
+    const cell = cells.get(id) ?? make("button", "", []);
+    cells.set(id, cell);
+    fill(cell, row, reviewed.has(id));
+    cell.classList.toggle("marked", marked.has(id));
+    mark(cell, highlight);
+    return cell;
+  });
+  if (shown.length !== sheet.children.length || shown.some((cell, index) => cell !== sheet.children[index])) {
+    const held = sheet.contains(document.activeElement) ? /** @type {HTMLElement} */ (document.activeElement) : null;
+    sheet.replaceChildren(...shown);
+    held?.focus({ preventScroll: true });
+  }
+  rove(shown.find((cell) => cell.tabIndex === 0) ?? shown[0]);
+}
+
+/** Show what is hovered, brushed and selected. @param {import("./plots.js").Highlight} highlight */
+export function markSheet(highlight) {
+  for (const cell of cells.values()) mark(cell, highlight);
+}
+
+/** Go on to the next of these that nobody has looked at; the first that is left, after the last. @param {Set<string>} ids @returns {boolean} whether there is one */
+export function nextUnreviewed(ids) {
+  const all = items();
+  const from = all.indexOf(/** @type {HTMLElement} */ (document.activeElement)) + 1;
+  const next = [...all.slice(from), ...all.slice(0, from)].find((cell) => ids.has(String(cell.dataset.id)) && !cell.matches(".reviewed, .excluded"));
+  next?.focus();
+  return next !== undefined;
+}
+
+const items = () => /** @type {HTMLElement[]} */ ([...sheet.children]);
+
+/** @param {HTMLElement} cell @param {import("./plots.js").Highlight} highlight */
+function mark(cell, { hovered, brushed, selected }) {
+  const id = String(cell.dataset.id);
+  cell.classList.toggle("hovered", hovered.has(id) || brushed.has(id));
+  cell.setAttribute("aria-current", String(selected === id));
+}
+
+/** @param {HTMLButtonElement} cell @param {Row} row @param {boolean} isReviewed */
+function fill(cell, { click, kind, right, down, length }, isReviewed) {
+  const side = Math.round(Math.min(MOST, Math.max(SIDE, WIDER * length)));
+  const { sec, nanosec } = stampOf(click.frame);
+  const source = `api/crop.jpg?time=${sec}${String(nanosec).padStart(9, "0")}&u=${click.u_px.toFixed(2)}&v=${click.v_px.toFixed(2)}&side=${side}`;
+  const words = `${nameOf(click.id)}: ${length.toFixed(1)} px${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;
+  const drawn = `${source} ${right.toFixed(1)} ${down.toFixed(1)} ${words}`;
+  if (cell.dataset.drawn === drawn) return;
+  cell.className = `crop ${kind}${isReviewed ? " reviewed" : ""}`;
+  Object.assign(cell.dataset, { id: click.id, drawn, roves: KEYS });
+  cell.setAttribute("aria-label", words);
+  cell.onclick = () => arrive(click.id);
+  let image = cell.querySelector("img");
+  if (image?.getAttribute("src") !== source) {
+    image = make("img", "", []);
+    Object.assign(image, { loading: "lazy", width: SIDE, height: SIDE, alt: "", src: source });
+  }
+  const arrow = shape("svg", { viewBox: `${-side / 2} ${-side / 2} ${side} ${side}`, "aria-hidden": "true" });
+  const ring = 0.05 * side;
+  for (const name of ["rim", "residual"]) arrow.append(shape("path", { class: name, d: `M0 0L${right} ${down}M${right + ring} ${down}a${ring} ${ring} 0 1 0 ${-2 * ring} 0a${ring} ${ring} 0 1 0 ${2 * ring} 0` }));
+  cell.replaceChildren(image, arrow, make("span", "", [make("b", "", nameOf(click.id)), ` ${length.toFixed(1)} px${isReviewed ? " ✓" : ""}`]));
+}
+
+/** One cut-out can be reached by Tab. @param {HTMLElement|undefined} current */
+function rove(current) {
+  const cell = current?.closest(".crop");
+  if (!cell) return;
+  for (const item of items()) item.tabIndex = item === cell ? 0 : -1;
+}
+
+/** @param {KeyboardEvent} event */
+function pressed(event) {
+  const [all, cell] = [items(), /** @type {HTMLElement} */ (event.target).closest(".crop")];
+  if (!(cell instanceof HTMLElement) || event.ctrlKey || event.metaKey || event.altKey) return;
+  const [at, id] = [all.indexOf(cell), String(cell.dataset.id)];
+  const columns = all.filter((item) => item.offsetTop === all[0].offsetTop).length;
+  const to = /** @type {Record<string, number>} */ ({ ArrowLeft: at - 1, ArrowRight: at + 1, ArrowUp: at - columns, ArrowDown: at + columns, Home: 0, End: all.length - 1 })[event.key];
+  if (to !== undefined) all[Math.max(0, Math.min(all.length - 1, to))].focus();
+  else if (/^x$/i.test(event.key)) say({ type: "click_excluded", id, excluded: !cell.classList.contains("excluded") });
+  else if (/^r$/i.test(event.key)) say({ type: "marks_reviewed", ids: [id], reviewed: !cell.classList.contains("reviewed") });
+  else return;
+  event.preventDefault();
+}
+
+/** @param {Record<string, any>} step */
+async function say(step) {
+  const refusal = await send(step);
+  if (refusal) toast(refusal);
+}
