@@ -596,6 +596,7 @@ export interface CandidateRow {
   used: boolean;
   chosen: boolean;
   words: string;
+  answer: string;
 }
 
 /** The candidates of the selected click. */
@@ -604,8 +605,7 @@ export interface PairCandidates {
   click: string;
   revision: number;
   rows: CandidateRow[];
-  suggested: number;
-  suggestion: string;
+  asked: number[];
 }
 
 /** What a review shows of one pair beyond its row; written as an array. */

@@ -3,7 +3,7 @@
 import { opened, register, withImages } from "../base/actions.js";
 import { clickIn, selectedClick, state } from "../base/state.js";
 import { toPlacement } from "./arriving.js";
-import { choose, nextCandidate, withoutCandidates } from "./candidates.js";
+import { choose, keepCandidate, nextCandidate, withoutCandidates } from "./candidates.js";
 import { nudgeBy, removeSelected, snap, turnBack, withoutSnappable } from "./clicking.js";
 import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
@@ -22,10 +22,8 @@ const redoable = () => withImages() || (state.view?.can_redo ? "" : "There is no
 
 /** Without a proposal: set the mark of the keyboard's cross, keep the return that is asked about, or go on. */
 function enter() {
-  const [cross, asked] = [state.cross, state.candidates];
-  if (cross) return enterCross(cross);
-  if (asked?.suggestion && selectedClick()?.frame === state.shown?.index) return choose(asked.rows.findIndex((row) => row.used));
-  if (!withPlacements()) toPlacement(1);
+  if (state.cross) return enterCross(state.cross);
+  if (!keepCandidate() && !withPlacements()) toPlacement(1);
 }
 
 /** @param {number} du @param {number} dv image px */

@@ -1,6 +1,6 @@
 /**
- * The radar returns that may belong to the selected click: numbered rings on the frame, and the choice between them. A click on
- * a number chooses; C takes the one that would fit better, or else the next one; undo takes the choice back.
+ * The radar returns that may belong to the selected click: numbered rings on the frame, and the question which one it is. C shows
+ * one after the other, Enter keeps what is shown, a click on a number chooses it; undo takes the choice back.
  */
 
 import { growth, ink, smallFont } from "../base/colours.js";
@@ -11,11 +11,15 @@ import { emit, on, selectedClick, stampOf, state } from "../base/state.js";
 import { toCss, toDevice, viewport } from "./geometry.js";
 
 /** @typedef {import("../messages.js").CandidateRow} Candidate */
-/** Candidates that are less probable than this are not drawn on the frame, except the one in use and the suggested one. */
+/** Candidates that are less probable than this are not drawn on the frame, except the one in use and those that are asked about. */
 const LEAST = 0.01;
 /** Numbers stand this far from their ring, so that a click at the reflector never chooses [CSS px]. */
 const ASIDE = 20;
 const RADIUS = 9;
+/** Of more candidates that nobody asks about, C shows the most probable. */
+const MOST_SHOWN = 6;
+/** The row that C shows; -1 before it is pressed. */
+let at = -1;
 
 export function startCandidates() {
   addLayer("candidates", drawCandidates);
@@ -26,6 +30,7 @@ export function startCandidates() {
 
 /** @param {import("../messages.js").PairCandidates|null} message */
 export function take(message) {
+  if (message?.click !== state.candidates?.click || message?.revision !== state.candidates?.revision) at = -1;
   state.candidates = message && message.rows.length && message.click === state.selected ? message : null;
   emit("candidates");
 }
@@ -37,10 +42,10 @@ export const candidatesOf = (id) => (id !== "" && state.candidates?.click === id
 function drawn() {
   const click = selectedClick();
   if (!click || click.frame !== state.shown?.index || !state.candidates) return [];
-  const suggested = state.candidates.suggested;
+  const asked = question()?.rows ?? [];
   return candidatesOf(click.id)
     .map((row, index) => ({ row, number: index + 1 }))
-    .filter(({ row, number }) => row.u_px !== null && (row.used || number - 1 === suggested || (row.probability ?? 0) >= LEAST));
+    .filter(({ row, number }) => row.u_px !== null && (row.used || asked.includes(number - 1) || (row.probability ?? 0) >= LEAST));
 }
 
 /** Where the number of a candidate stands [CSS px]. @param {Candidate} row @returns {[number, number]} */
@@ -63,14 +68,15 @@ function drawCandidates(pen) {
   const here = drawn();
   if (here.length < 2) return;
   const { ratio, unit } = viewport;
+  const shown = question()?.shown;
   for (const { row, number } of here) {
     const [x, y] = toDevice(Number(row.u_px), Number(row.v_px));
-    const suggested = number - 1 === state.candidates?.suggested;
-    if (!row.used) ring(pen, x, y, suggested);
+    const isShown = number - 1 === shown;
+    if (!row.used || isShown) ring(pen, x, y, isShown);
     const [bx, by] = badge(row).map((value) => value * ratio);
     pen.beginPath();
     pen.arc(bx, by, RADIUS * 0.85 * unit, 0, 2 * Math.PI);
-    pen.fillStyle = row.used ? ink.ring : suggested ? ink.guess : "rgb(20 26 32 / 85%)";
+    pen.fillStyle = isShown ? ink.guess : row.used ? ink.ring : "rgb(20 26 32 / 85%)";
     pen.fill();
     pen.lineWidth = unit;
     pen.strokeStyle = ink.guess;
@@ -78,17 +84,17 @@ function drawCandidates(pen) {
     pen.font = smallFont(0.9 * ratio, "600");
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    pen.fillStyle = row.used || suggested ? "#10161c" : "#ffffff";
+    pen.fillStyle = row.used || isShown ? "#10161c" : "#ffffff";
     pen.fillText(row.chosen ? "✓" : String(number), bx, by + 0.5 * unit);
     pen.textBaseline = "alphabetic";
   }
 }
 
-/** @param {CanvasRenderingContext2D} pen @param {number} x @param {number} y @param {boolean} suggested */
-function ring(pen, x, y, suggested) {
-  for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [ink.guess, suggested ? 1.8 : 1.1]])) {
+/** @param {CanvasRenderingContext2D} pen @param {number} x @param {number} y @param {boolean} isShown */
+function ring(pen, x, y, isShown) {
+  for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [ink.guess, isShown ? 1.8 : 1.1]])) {
     pen.beginPath();
-    pen.setLineDash(suggested ? [] : [2 * viewport.unit, 2.5 * viewport.unit]);
+    pen.setLineDash(isShown ? [] : [2 * viewport.unit, 2.5 * viewport.unit]);
     pen.arc(x, y, 8 * viewport.unit, 0, 2 * Math.PI);
     pen.lineWidth = width * viewport.unit;
     pen.strokeStyle = colour;
@@ -108,16 +114,34 @@ export async function choose(index) {
   if (refusal) toast(refusal);
 }
 
-/** Take the return that would fit better, or else the one after the present one; after the last, leave it to the program again. */
+/**
+ * The question which return the selected click belongs to: the rows to choose from, and the one that is shown; null if it is not
+ * asked, by the server or by C.
+ * @returns {{rows: number[], shown: number}|null}
+ */
+export function question() {
+  const candidates = state.candidates;
+  if (!candidates || selectedClick()?.frame !== state.shown?.index) return null;
+  if (!candidates.asked.length && at < 0) return null;
+  const rows = candidates.asked.length ? candidates.asked : candidates.rows.slice(0, MOST_SHOWN).map((_, index) => index);
+  return { rows, shown: at < 0 ? rows[0] : at };
+}
+
+/** Show the return after the one that is shown, or after the one in use. */
 export function nextCandidate() {
   const candidates = state.candidates;
   if (!candidates) return;
-  if (candidates.suggested >= 0) return choose(candidates.suggested);
-  const now = candidates.rows.findIndex((row) => row.used);
-  const chosen = candidates.rows.some((row) => row.chosen);
-  const next = now + 1;
-  if (next >= candidates.rows.length) return choose(chosen ? -1 : 0);
-  return choose(next);
+  if (at < 0) at = Math.max(0, candidates.rows.findIndex((row) => row.used));
+  const rows = question()?.rows ?? [];
+  at = rows[(rows.indexOf(at) + 1) % rows.length] ?? -1;
+  emit("candidates");
+}
+
+/** Keep the return that is shown. @returns {boolean} whether it was asked for */
+export function keepCandidate() {
+  const asked = question();
+  if (asked) void choose(asked.shown);
+  return asked !== null;
 }
 
 /** Why no candidate can be chosen now; "" if one can. */

@@ -8,6 +8,7 @@ import { make } from "../base/notices.js";
 import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state, stateOf } from "../base/state.js";
 import { openOption } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
+import { question } from "../image/candidates.js";
 import { saidWords } from "../proposals/proposals.js";
 import { placementWords, proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { goToPair } from "./pairs.js";
@@ -79,7 +80,7 @@ const RULES = [
   { name: "cross", when: () => state.cross, say: crossWords, act: true },
   { name: "proposal", when: proposalWords, say: () => proposalWords() ?? [], act: true },
   { name: "told", when: ({ placement }) => saidWords() && !(placement && isOffered(placement)), say: () => [saidWords()] },
-  { name: "return", when: ({ click }) => returnAsked(click), say: ({ click }) => [returnAsked(click), { key: "C", label: "take the other", action: "next-candidate" }], act: true },
+  { name: "return", when: question, say: returnWords, act: true },
   { name: "guess", when: ({ click }) => click?.state === "untouched", say: () => ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true },
   { name: "beyond", when: ({ click, verdict }) => click?.state === "unpaired" && verdict.option === RANGE.option, say: () => BEYOND, act: true },
   { name: "unpaired", when: ({ click }) => click?.state === "unpaired", say: () => ["No radar position here: click another frame of this placement.", NEXT], act: true },
@@ -112,8 +113,12 @@ function crossWords() {
   return [...(touched || !expected ? [] : ["The radar expects it here."]), { key: "1–9", label: "zoom" }, { key: "arrows", label: "move" }, { key: "Enter", label: last, action: "place-mark" }];
 }
 
-/** What is asked about the return of a click; "" if nothing is. @param {import("../messages.js").ClickRow} [click] */
-const returnAsked = (click) => (click && state.candidates?.click === click.id ? state.candidates.suggestion : "");
+/** @returns {Words} */
+function returnWords() {
+  const { rows, shown } = question() ?? { rows: [], shown: 0 };
+  const answers = state.candidates?.rows ?? [];
+  return [`Which return? ${rows.map((row) => answers[row].answer).join(" | ")}`, { key: "C", label: "show another", action: "next-candidate" }, { key: "Enter", label: `keep ${answers[shown].range_m.toFixed(1)} m`, action: "place-mark" }];
+}
 
 /** What may be wrong with a pair that disagrees: the mark, or the return. @param {Now} now @returns {Words} */
 function misfitWords({ click }) {

@@ -163,10 +163,10 @@ function drawCandidateRows() {
 
 /** @param {import("../messages.js").CandidateRow} row @param {number} index */
 function candidateRow(row, index) {
-  const suggested = state.candidates?.suggested === index;
+  const asked = state.candidates?.asked.includes(index);
   const chance = row.probability === null ? "" : `${Math.round(100 * row.probability)} %`;
   const away = row.distance_px === null ? "" : `${digits(row.distance_px)} px away`;
-  const button = make("button", `choice${row.used ? " used" : ""}${suggested ? " suggested" : ""}`, [
+  const button = make("button", `choice${row.used ? " used" : ""}${asked ? " asked" : ""}`, [
     make("b", "", row.chosen ? "✓" : String(index + 1)),
     make("span", "where", row.words),
     make("span", "", away),
@@ -175,7 +175,7 @@ function candidateRow(row, index) {
   ]);
   button.dataset.choice = String(index);
   button.setAttribute("aria-pressed", String(row.used));
-  const why = row.chosen ? "You chose this return. Click again to leave the choice to the program." : row.used ? "This return is used. Click to fix the choice." : suggested ? "This return fits the click better. Click to choose it (C)." : "Click to choose this return for the click.";
+  const why = row.chosen ? "You chose this return. Click again to leave the choice to the program." : row.used ? "This return is used. Click to fix the choice." : "Click to choose this return for the click.";
   button.dataset.hint = `${why}\nSeen in ${row.scans} scans. ${row.distance_px === null ? "The percentage says how plausible it is among the others, before there is a pose." : "The percentage says how probable it is, given the click and the pose."}`;
   return button;
 }

@@ -19,13 +19,13 @@ _READS = {
     "replace",
 }
 _READS |= {"strip", "lstrip", "rstrip", "find", "index", "count", "splitlines"}
-_TEXTS = {"message", "hint", "reason", "label", "action", "note", "suggestion"}
+_TEXTS = {"message", "hint", "reason", "label", "action", "note", "answer"}
 """Fields that hold what a person reads."""
 _MAY_READ = ("calib_core/words/", "calib_core/recordings/")
 _JS = re.compile(
-    r"\b(?:message|hint|reason|label|action|note|suggestion|assumes)\??"
+    r"\b(?:message|hint|reason|label|action|note|answer|assumes)\??"
     r"\.(?:startsWith|endsWith|includes|match|matchAll|replace|replaceAll|search|split|slice|substring|indexOf|test)\("
-    r"|\.test\([\w.]*\.(?:message|hint|reason|label|action|note|suggestion)\)"
+    r"|\.test\([\w.]*\.(?:message|hint|reason|label|action|note|answer)\)"
     r"|new RegExp\("
 )
 _OF_USERS = {

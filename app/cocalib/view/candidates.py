@@ -1,4 +1,4 @@
-"""The radar returns that may belong to a click: where each is, how well it fits, and which one would fit better."""
+"""The radar returns that may belong to a click: where each is, how well it fits, and between which a person is to choose."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from cocalib.session.state import Session
 from cocalib.view.wording import position_words
 
 _FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom
-_BETTER = 0.5  # probability from which on another return is suggested
+_BETTER = 0.5  # probability from which on another return is asked about
 _SAME_M = 0.02
 _MARGIN = 0.1  # of the image's width
 
@@ -38,6 +38,7 @@ class CandidateRow:
         used: the pair has this return now.
         chosen: because a person chose it.
         words: where it is, as text: "20.0 m, 2.5° right, 0.4° down".
+        answer: the same as a short answer: "20.0 m, 80 %".
     """
 
     position_m: tuple[float, float, float]
@@ -53,6 +54,7 @@ class CandidateRow:
     used: bool
     chosen: bool
     words: str
+    answer: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +65,14 @@ class PairCandidates:
         click: its id.
         revision: of the session that they belong to.
         rows: the most probable first.
-        suggested: index of the row that would fit better than the one in use; -1 if there is none.
-        suggestion: the same as a sentence; "" if there is none.
+        asked: indices of the rows between which a person is to choose, the one in use first; empty if nothing is asked, or
+            it was answered.
     """
 
     click: str
     revision: int
     rows: tuple[CandidateRow, ...]
-    suggested: int = -1
-    suggestion: str = ""
+    asked: tuple[int, ...] = ()
 
 
 def pair_of_click(session: Session, click_id: str) -> Pair | None:
@@ -105,19 +106,8 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
     rival = _rival_index(calibration, pair, candidates)
     better = _better_index(fits, used) if rival < 0 else rival
-    ordered = tuple(rows[i] for i in order)
-    if better < 0:
-        return PairCandidates(pair.id, session.revision, ordered)
-    words = f"The {_choice(rows[better])} return fits better"
-    if rival >= 0:
-        words = "Which return? " + " or ".join(_choice(rows[i], percent=True) for i in (used, better) if i >= 0)
-    return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
-
-
-def _choice(row: CandidateRow, *, percent: bool = False) -> str:
-    """Return a candidate in a few words: "25.1 m, 80 %"."""
-    likely = f", {100.0 * row.probability:.0f} %" if percent and row.probability is not None else ""
-    return f"{row.range_m:.1f} m{likely}"
+    asked = tuple(order.index(i) for i in (used, better) if i >= 0) if better >= 0 and pair.chosen is None else ()
+    return PairCandidates(pair.id, session.revision, tuple(rows[i] for i in order), asked)
 
 
 def _in_view(calibration: Calibration, candidates: Sequence[Candidate], used: int) -> list[Candidate]:
@@ -171,7 +161,8 @@ def _row(candidate: Candidate, fit: CandidateFit | None, *, used: bool, chosen: 
     range_m, azimuth, elevation = polar_from_cartesian(candidate.position_radar_m[None])[0].tolist()
     seen = fit is not None and bool(np.isfinite(fit.projected_px).all())
     u_px, v_px = fit.projected_px.tolist() if fit is not None and seen else (None, None)
-    probability = candidate.score if fit is None else fit.probability
+    probability = _number(candidate.score if fit is None else fit.probability, 3)
+    likely = "" if probability is None else f", {100.0 * probability:.0f} %"
     return CandidateRow(
         position_m=(x_m, y_m, z_m),
         range_m=round(range_m, 3),
@@ -179,13 +170,14 @@ def _row(candidate: Candidate, fit: CandidateFit | None, *, used: bool, chosen: 
         elevation_deg=round(math.degrees(elevation), 3),
         snr_db=_number(candidate.snr_db, 1),
         scans=candidate.scans,
-        probability=_number(probability, 3),
+        probability=probability,
         u_px=u_px,
         v_px=v_px,
         distance_px=_number(fit.distance_px, 2) if fit is not None and seen else None,
         used=used,
         chosen=chosen,
         words=position_words(candidate.position_radar_m),
+        answer=f"{range_m:.1f} m{likely}",
     )
 
 

@@ -11,7 +11,7 @@ from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import Pair, Stamp, TimeNs, Unpaired, Unsolvable
+from calib_core.measurements import ChosenReturn, Pair, Stamp, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
@@ -108,8 +108,12 @@ def test_a_click_that_two_returns_fit_asks_for_one_of_them():
     outcome = calibration(*FIVE[:4], ASKING)
     assert not any(str(line).startswith("disagrees") for line in summary_lines(outcome))
     offered = click_candidates(advance(clicked(5), Solved(5, outcome), FACTS).present, ASKING.measured)
-    assert offered.rows[offered.suggested].position_m == BEHIND_M
-    assert re.findall(r"[\d.]+ m", offered.suggestion) == ["6.0 m", "7.2 m"]
+    assert [offered.rows[i].position_m for i in offered.asked] == [NEAR_M, BEHIND_M], (
+        "both answers, the one in use first"
+    )
+    assert [re.findall(r"[\d.]+ m", offered.rows[i].answer) for i in offered.asked] == [["6.0 m"], ["7.2 m"]]
+    chosen = replace(ASKING.measured, chosen=ChosenReturn(NEAR_M))
+    assert click_candidates(advance(clicked(5), Solved(5, outcome), FACTS).present, chosen).asked == (), "answered once"
 
 
 def test_a_return_that_the_camera_does_not_see_is_not_offered_unless_it_is_in_use():
