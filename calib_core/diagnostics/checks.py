@@ -13,7 +13,7 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.diagnostics.causes import causes
 from calib_core.diagnostics.handedness import handedness
 from calib_core.diagnostics.intrinsics import lens_or_scale, refined_too_far
-from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, pivotal_pair
+from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair
 from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
@@ -33,7 +33,7 @@ _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
-_UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers", "doubtful-pair")
+_UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers")
 _TOLD_BY_MORE = (
     "handedness-assumed",
     "weak-geometry",
@@ -43,7 +43,7 @@ _TOLD_BY_MORE = (
 )
 _OF_PIXELS = ("mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected")
 _OF_LENGTHS = ("camera-far-away", "weak-geometry", "two-poses", "lens-or-radar-scale")
-_OF_RETURNS = ("no-consensus", "many-outliers", "agreeing-outliers", "clock-bias-suspected", "doubtful-pair")
+_OF_RETURNS = ("no-consensus", "many-outliers", "agreeing-outliers", "clock-bias-suspected")
 _FOLLOWS = {"pixels-suspected": _OF_PIXELS, "units-suspected": (*_OF_PIXELS, *_OF_LENGTHS), "clocks-apart": _OF_RETURNS}
 """What a named cause makes likely, and what is said of it would send the user elsewhere."""
 _OBJECTIONS_TO_INTRINSICS = (
@@ -73,7 +73,6 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _weak_geometry,
         _same_places,
         ambiguous_candidates,
-        pivotal_pair,
         agreeing_outliers,
         decisive_pair,
     )

@@ -1,4 +1,4 @@
-"""Warnings about single pairs: ambiguous candidates, the pivotal pair, and pairs that no other pair checks."""
+"""Warnings about single pairs: ambiguous candidates, and pairs that no other pair checks."""
 
 import numpy as np
 
@@ -16,24 +16,6 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
     if not ambiguous:
         return []
     return [DataWarning("uncertain-association", {"ids": ambiguous})]
-
-
-def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
-    """Name the pair without which the others, judged anew, agree on another pose."""
-    pair = fit.alternatives.pivotal
-    if pair is None:
-        return []
-    return [
-        DataWarning(
-            "doubtful-pair",
-            {
-                "pair": fit.ids[pair.pair],
-                "camera_moves_cm": 100.0 * pair.camera_move_m,
-                "sigmas": pair.standard_deviations,
-                "switched": [fit.ids[i] for i in pair.switched],
-            },
-        )
-    ]
 
 
 def decisive_pair(fit: SolvedFit) -> list[DataWarning]:

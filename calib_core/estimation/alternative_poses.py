@@ -11,11 +11,6 @@ over the pose by Laplace's method, from a prior in which all rotations are equal
 
 Outliers without a common pose reach a ratio of B in at most one of B sets.
 
-Pivotal pair: the pair without which the others, judged anew, agree on another pose. A wrong pair can agree with a few others,
-right or wrong, on a wrong pose and so have pairs set aside that contradict it. Leaving it out by one Newton step, or with the
-weights of the others kept, does not show that. Every pair is left out in turn, all fits run as one batch, and in each the
-others decide again which of them are inliers.
-
 Posterior summary: the pose and the 95 % ellipsoid of posterior samples, and the other poses that are possible.
 
 The fit and its covariance stand as long as their ellipsoid holds its share of the posterior and the mean is near the fit. If
@@ -264,61 +259,6 @@ def _log_ratios(modes: Modes, sigma_m: float) -> Values:
     return np.asarray(modes.evidence + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(modes.hessians)[1])
 
 
-_LEAST_MOVE = 2.6  # standard deviations without the pair; sets of right pairs exceed it in at most one of a hundred
-_LEAST_WITHOUT_ONE, _MOST_WITHOUT_ONE = 6.0, 100  # pairs; in larger sets no single one matters
-_ROUNDS_LEFT_OUT = 8
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PivotalPair:
-    """One pair, and what the pose does without it.
-
-    Attributes:
-        pair: its index in the measurements.
-        camera_move_m: distance by which the camera centre moves.
-        standard_deviations: length of the pose's move under the covariance without it.
-        switched: indices of the pairs that are inliers either with it or without it, but not both.
-    """
-
-    pair: int
-    camera_move_m: float
-    standard_deviations: float
-    switched: tuple[int, ...] = ()
-
-
-def find_pivotal_pair(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> PivotalPair | None:
-    """Return the pair on which the pose depends most, if the pose moves far without it.
-
-    Args:
-        measurements: all pairs with the assumed noise.
-        refined: their fit.
-    """
-    inliers = np.flatnonzero(refined.inliers)
-    if refined.weights.sum() < _LEAST_WITHOUT_ONE or len(measurements) > _MOST_WITHOUT_ONE:
-        return None
-    posterior = pose_posterior(measurements, refined.camera_from_radar, np.zeros(3))
-    used = np.ones((len(inliers) + 1, len(measurements)), dtype=bool)
-    used[1 + np.arange(len(inliers)), inliers] = False
-    log_scales = np.tile(np.log(refined.noise_scale), (len(used), 1))
-    starts = batch_of([refined.camera_from_radar] * len(used))
-    modes = refine_poses(posterior, starts, log_scales, share=refined.inlier_share, used=used, rounds=_ROUNDS_LEFT_OUT)
-    whole = modes.poses.transform(0)
-    moves = np.array([modes.poses.transform(1 + k).error_from(whole) for k in range(len(inliers))])
-    lengths = np.sqrt(np.einsum("ki,kij,kj->k", moves, modes.hessians[1:], moves))
-    most = int(np.argmax(lengths))
-    if not lengths[most] > _LEAST_MOVE:
-        return None
-    agree = modes.inlier > 0.5
-    switched = np.flatnonzero(agree[0] != agree[1 + most])
-    centres = [modes.poses.transform(k).inverse().translation_m for k in (0, 1 + most)]
-    return PivotalPair(
-        pair=int(inliers[most]),
-        camera_move_m=float(np.linalg.norm(centres[1] - centres[0])),
-        standard_deviations=float(lengths[most]),
-        switched=tuple(switched[switched != inliers[most]].tolist()),
-    )
-
-
 _MOST_PAIRS = 150  # in larger sets the posterior has one peak, and samples cost seconds
 _CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75  # inliers, and their share, beyond which samples never changed an answer
 
@@ -334,14 +274,12 @@ class PoseAlternatives:
         refined: the fit, at the mean of the posterior where the peak does not describe it.
         uncertainty: of its pose, from the samples where the local one does not hold.
         possible: separate poses, the most probable first; empty if the posterior was not sampled.
-        pivotal: the pair without which the others agree on another pose.
         agreeing: outliers that agree among themselves on another pose.
     """
 
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance
     possible: tuple[PossiblePose, ...] = ()
-    pivotal: PivotalPair | None = None
     agreeing: AgreeingOutliers | None = None
 
 
@@ -353,7 +291,7 @@ def find_alternatives(
     *,
     seed: int,
 ) -> PoseAlternatives:
-    """Sample the posterior, and find the pivotal pair and outliers that agree.
+    """Sample the posterior, and find outliers that agree.
 
     The posterior is that of the pose at the fitted systematic errors; what these add to the covariance is added to each sample.
 
@@ -366,12 +304,7 @@ def find_alternatives(
     """
     rng = np.random.default_rng(seed)
     corrected = measurements.with_errors(refined.measurements.errors.values)
-    beyond = PoseAlternatives(
-        refined,
-        uncertainty,
-        pivotal=find_pivotal_pair(corrected, refined),
-        agreeing=find_agreeing_outliers(corrected, refined, rng=rng),
-    )
+    beyond = PoseAlternatives(refined, uncertainty, agreeing=find_agreeing_outliers(corrected, refined, rng=rng))
     enough = refined.inliers.sum() >= _CLEARLY_ENOUGH and refined.inliers.mean() >= _CLEARLY_AGREEING
     clear = enough and uncertainty.condition <= NARROW_CONDITION
     if clear or measurements.prior.measured or measurements.flat or len(measurements) > _MOST_PAIRS:

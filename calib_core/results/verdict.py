@@ -377,7 +377,6 @@ CODES: dict[Consequence, tuple[str, ...]] = {
     ),
     "limited": (
         "agreeing-outliers",
-        "doubtful-pair",
         "one-pair-decides",
         "weak-geometry",
         _FEW,

@@ -21,7 +21,7 @@ from calib_core.results.systematic_errors import SystematicErrorResult, family_o
 from calib_core.words import evaluation, intrinsics
 from calib_core.words.remark import Remark, Row, by_code, by_row, remark
 from calib_core.words.systematic_errors import FAMILIES, error_words, knowledge, percent, prior_text, value_text
-from calib_core.words.text import Words, count, join, listed, named, option, say
+from calib_core.words.text import count, join, listed, named, option, say
 
 _APEX = "the inner corner, where the three plates meet, not the reflector's mouth or stand"
 _ONE_BY_ONE = "was the reflector clicked, was it at rest, do both recordings use the same clock?"
@@ -176,27 +176,6 @@ def uncertain_association(*, ids: Sequence[str]) -> Remark:
         say("more than one radar position fits the click of {ids}", ids=listed(ids)),
         "choose the return of each on the page (C), or exclude the pair",
         ChooseReturn(tuple(ids)),
-    )
-
-
-def doubtful_pair(*, pair: str, camera_moves_cm: float, sigmas: float, switched: Sequence[str]) -> Remark:
-    """Given when without one pair the others, judged anew, agree on another pose.
-
-    Could also be: which of the two poses is right.
-    """
-    name = named(pair)
-    changed = say(", and {switched} would change sides", switched=listed(switched)) if switched else Words()
-    return remark(
-        say(
-            "the pose rests on {name}, a high-leverage pair: without {name} the camera moves {camera_moves_cm:.0f} cm, "
-            "{sigmas:.1f} σ{changed}",
-            name=name,
-            camera_moves_cm=camera_moves_cm,
-            sigmas=sigmas,
-            changed=changed,
-        ),
-        say("check the click and the radar position of {name}, or add placements near it", name=name),
-        ReviewPairs((pair,)),
     )
 
 
@@ -936,7 +915,6 @@ SOLVER = by_code(
     clock_bias_suspected,
     clocks_apart,
     damaged_recording,
-    doubtful_pair,
     few_pairs,
     flat_radar,
     handedness_assumed,

@@ -104,7 +104,7 @@ def _told(draw: Draw) -> str:
     return f"{draw.noise}, {draw.pairs}, {'free' if draw.tape_m is None else 'tape'}{apart}"
 
 
-_MODES = ("agreeing-outliers", "doubtful-pair", "one-pair-decides", "two-poses")
+_MODES = ("agreeing-outliers", "one-pair-decides", "two-poses")
 _HAND = ("mirrored-axes", "handedness-open")
 _LENS = ("angle-scale", "intrinsics-suspected")
 _TAPE = ("camera-position-contradicted", "camera-position-doubtful")

@@ -14,7 +14,7 @@ from calib_core.synthetic.recording import simulate
 __all__ = ["ADVERSARIES_OF_SCANS"]
 
 _COARSE = (0.15, 0.026, 0.052)  # 15 cm, 1.5 deg, 3 deg
-_ANOTHER = ("uncertain-association", "two-poses", "doubtful-pair", "one-pair-decides")
+_ANOTHER = ("uncertain-association", "two-poses", "one-pair-decides")
 _FIRST_SEED = 880_001
 _RATE_HZ = 5.0  # half the usual rate, for speed
 

@@ -134,7 +134,7 @@ def test_how_well_the_pairs_alone_place_a_measured_camera_is_stated(noise, tape_
 
 
 def test_what_the_figures_cover_does_not_make_them_coarse(good):
-    for code in ("residuals-too-large", "agreeing-outliers", "weak-geometry", "one-pair-decides", "doubtful-pair"):
+    for code in ("residuals-too-large", "agreeing-outliers", "weak-geometry", "one-pair-decides"):
         verdict = verdict_on(warned(good, code))
         assert (verdict.level, verdict.error) == ("usable", stated_error(good))
 

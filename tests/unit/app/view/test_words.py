@@ -134,7 +134,6 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("damaged-recording", {"lost": 0, "share": 0.12, "damage": _DAMAGE}),
     DataWarning("radar-missing", {"lost": 6, "clicks": 20, "damage": _DAMAGE}),
     DataWarning("radar-mostly-missing", {"lost": 11, "clicks": 20, "damage": None}),
-    DataWarning("doubtful-pair", {"pair": "c7", "camera_moves_cm": 11.0, "sigmas": 3.1, "switched": ["c2"]}),
     DataWarning("few-pairs", {"agreeing": 5, "pairs": 5, "needed": 8, "clear": True}),
     DataWarning("few-pairs", {"agreeing": 5, "pairs": 5, "needed": 8, "clear": False}),
     DataWarning("few-pairs", {"agreeing": 5, "pairs": 6, "needed": 8, "clear": False}),
