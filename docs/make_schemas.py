@@ -24,6 +24,7 @@ from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, Prop
 from calib_core.interchange.syntax.strict_json import is_setting, json_text
 from calib_core.json_forms import form_of
 from calib_core.measurements import Stamp
+from calib_core.watching.baseline import BASELINE_SCHEMA, BaselineDocument
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome
 from cocalib.batch.results_table import RESULTS_SCHEMA, BatchResults
 
@@ -38,6 +39,7 @@ _DOCUMENTS: dict[str, Any] = {
     BOARD_VIEWS_SCHEMA: BoardViewsDocument,
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
+    BASELINE_SCHEMA: BaselineDocument,
     OUTCOME_SCHEMA: Outcome,
     RESULTS_SCHEMA: BatchResults,
 }

@@ -21,7 +21,7 @@ _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
 _PAGES = {
     "Tour": "tour gallery first-steps examples",
-    "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
+    "How to": "radar-formats intrinsics drift watch fleet proposals boxes evaluation report rerun simulation",
     "Concepts": "method conventions GLOSSARY apex paper reliability security",
     "Reference": "commands python formats warnings",
     "Studies": "accuracy paper-experiments speed",

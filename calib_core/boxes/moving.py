@@ -39,7 +39,7 @@ _STRETCH_FRAMES = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Background:
+class Background:
     """The scene without movement, in the working size.
 
     Attributes:
@@ -79,10 +79,10 @@ def changed_boxes(
         raise InputError(
             f"{source}: {len(images)} readable frames; finding movement needs {_FEWEST_FRAMES} or more: record for longer"
         )
-    small = [_reduced(image) for _, image in images]
+    small = [reduced(image) for _, image in images]
     size = (images[0][1].shape[1], images[0][1].shape[0])
     del images
-    background = _background(small)
+    background = background_of(small)
     _refuse_moving_camera([_changed_pixels(image, background) for image in small], background, source)
     found: list[tuple[TimeNs, list[Box]]] = []
     stretches = _stretches(image_times, most_frames)
@@ -92,9 +92,7 @@ def changed_boxes(
     for stretch in stretches:
         found = []
         for index, image in _readable(read_image, stretch):
-            found.append(
-                (TimeNs(int(image_times[index])), _regions(_changed_pixels(_reduced(image), background), size))
-            )
+            found.append((TimeNs(int(image_times[index])), _regions(_changed_pixels(reduced(image), background), size)))
             if progress:
                 progress(len(named) + len(found), total)
         tracks = tracked([boxes for _, boxes in found], first_track)
@@ -138,7 +136,7 @@ def _stretches(image_times: TimesNs, most: int) -> list[range]:
     return [range(start, start + span, step) for start in starts]
 
 
-def _reduced(image: np.ndarray) -> np.ndarray:
+def reduced(image: np.ndarray) -> np.ndarray:
     """Reduce an image to the working size; each pixel is the mean of those it replaces."""
     import cv2
 
@@ -149,7 +147,7 @@ def _reduced(image: np.ndarray) -> np.ndarray:
     return np.asarray(cv2.resize(image, (_WORKING_WIDTH_PX, reduced_height), interpolation=cv2.INTER_AREA))
 
 
-def _background(images: Sequence[np.ndarray]) -> _Background:
+def background_of(images: Sequence[np.ndarray]) -> Background:
     """Return the median of the frames, each brought to its brightness, and what is left of their deviations from it."""
     stack = np.stack(images)
     median = np.median(stack, axis=0).astype(np.float32)
@@ -157,7 +155,7 @@ def _background(images: Sequence[np.ndarray]) -> _Background:
         image[...] = np.clip(image / _gain(image.astype(np.float32), median), 0, 255)
     median = np.median(stack, axis=0).astype(np.float32)
     deviation = np.median(np.abs(stack - median), axis=0).astype(np.float32)
-    return _Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
+    return Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
 
 
 def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:
@@ -170,7 +168,7 @@ def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:
     return np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
 
 
-def _changed_pixels(image: np.ndarray, background: _Background) -> np.ndarray:
+def _changed_pixels(image: np.ndarray, background: Background) -> np.ndarray:
     """Return which pixels of a frame differ from the background: (h, w) bool, cleaned of specks."""
     import cv2
 
@@ -193,7 +191,7 @@ def _is_shadow(values: np.ndarray, expected: np.ndarray) -> np.ndarray:
     return np.asarray(inside & (brightest - darkest < _SHADOW_TINT))
 
 
-def _refuse_moving_camera(masks: Sequence[np.ndarray], background: _Background, source: str) -> None:
+def _refuse_moving_camera(masks: Sequence[np.ndarray], background: Background, source: str) -> None:
     """Refuse frames in which most of the image changes.
 
     Raises:

@@ -38,6 +38,7 @@ class Sightings:
         range_m: (s,) likewise.
         of_return: (n,) the sighting of each return, ascending.
         points_radar_m: (n, 3) the returns.
+        snr_db: (n,) of the returns; NaN where the radar reports none.
     """
 
     names: tuple[str, ...]
@@ -47,11 +48,12 @@ class Sightings:
     range_m: Values
     of_return: Indices
     points_radar_m: Points3
+    snr_db: Values
 
     def __post_init__(self) -> None:
         freeze(self, np.int64, frames=(None,), targets=(None,), of_return=(None,))
-        count = len(self.frames)
-        freeze(self, azimuth_rad=(count,), range_m=(count,), points_radar_m=(len(self.of_return), 3))
+        count, returns = len(self.frames), len(self.of_return)
+        freeze(self, azimuth_rad=(count,), range_m=(count,), points_radar_m=(returns, 3), snr_db=(returns,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,11 +342,12 @@ def tracked_sightings(targets: Sequence[TargetTrack], scans_of_frames: Indices) 
     scans = np.concatenate([none, *(target.scan_of_row for target in targets)])
     owner = np.repeat(np.arange(len(targets)), [len(target.rows) for target in targets])
     points = np.concatenate([np.zeros((0, 3)), *(target.points_radar_m for target in targets)])
+    snr_db = np.concatenate([np.zeros(0), *(target.snr_db for target in targets)])
     order = np.argsort(scans, kind="stable")
     low, high = (np.searchsorted(scans[order], scans_of_frames, side=side) for side in ("left", "right"))
     frames, places = _spans(low, np.where(scans_of_frames >= 0, high, low))
     rows = order[places]
-    return _sightings(tuple(target.id for target in targets), frames, owner[rows], points[rows])
+    return _sightings(tuple(target.id for target in targets), frames, owner[rows], points[rows], snr_db[rows])
 
 
 def _spans(low: Indices, high: Indices) -> tuple[Indices, Indices]:
@@ -409,11 +412,13 @@ def _tracks_of(
     return tracks
 
 
-def _sightings(names: tuple[str, ...], frames: Indices, targets: Indices, points: Points3) -> Sightings:
-    finite = np.isfinite(points).all(axis=1)
-    frames, targets, points = frames[finite], targets[finite], points[finite]
+def _sightings(
+    names: tuple[str, ...], frames: Indices, targets: Indices, points: Points3, snr_db: Values | None = None
+) -> Sightings:
+    snr_db = np.full(len(points), np.nan) if snr_db is None else snr_db
     order = np.lexsort((targets, frames))
-    frames, targets, points = frames[order], targets[order], points[order]
+    order = order[np.isfinite(points).all(axis=1)[order]]
+    frames, targets, points, snr_db = frames[order], targets[order], points[order], snr_db[order]
     keys = frames * max(len(names), 1) + targets
     first, of_return = np.unique(keys, return_index=True, return_inverse=True)[1:]
     sizes = np.maximum(np.bincount(of_return, minlength=len(first)), 1)
@@ -421,7 +426,7 @@ def _sightings(names: tuple[str, ...], frames: Indices, targets: Indices, points
         [np.bincount(of_return, weights=axis, minlength=len(first)) / sizes for axis in points.T], axis=1
     ).reshape(-1, 3)
     azimuth, range_m = np.arctan2(means[:, 1], means[:, 0]), np.linalg.norm(means, axis=1)
-    return Sightings(names, frames[first], targets[first], azimuth, range_m, of_return, points)
+    return Sightings(names, frames[first], targets[first], azimuth, range_m, of_return, points, snr_db)
 
 
 _LONGEST_STEP = 0.8  # widths or heights from where a box is expected, for a box of the same object
@@ -528,6 +533,8 @@ _TOLERANCE_M = 0.3  # across the line of sight
 _MOST_PARALLAX_M = 3.0  # distance between the sensors, across
 _STEP_RAD = np.deg2rad(0.5)
 _MOST_VOTES = 20_000
+_KEPT_VOTES = 0.5
+"""Of the votes of the best turn, that keep the turn of the stretch before."""
 _ROUNDS = 3
 _PART_M = 5.0  # between the ranges of parts of one target, or of a target and its cuboid
 _SIGHTINGS_AT_ONCE = 50_000
@@ -566,18 +573,21 @@ class _Meetings:
         return np.asarray(np.abs(_wrapped(self.apart_rad - expected)) / self.tolerance_rad)
 
 
-def match_by_bearing(sightings: Sightings, table: BoxTable, camera: Camera) -> Matches:
+def match_by_bearing(
+    sightings: Sightings, table: BoxTable, camera: Camera, *, start: Bearings | None = None
+) -> Matches:
     """Match targets and box tracks over their common lives.
 
     Args:
         sightings: of the targets that the radar followed.
         table: the boxes.
         camera: the lens alone; no pose enters.
+        start: how the two sensors saw the same target in the stretch before; taken unless another turn is clearly better.
     """
     meetings = _meetings(sightings, table, camera)
     if not len(meetings.sightings):
         return _matches(sightings, np.full(len(sightings.frames), -1), None, camera)
-    bearings = Bearings(_turn(meetings), 0.0)
+    bearings = _first_bearings(meetings, start)
     chosen = _choose_meetings(meetings, sightings, table, bearings)
     for _ in range(_ROUNDS - 1):
         bearings = _refined(meetings.some(chosen), bearings)
@@ -618,7 +628,8 @@ def returns_in_cuboids(
     points = scans.points_radar_m[rows]
     sigma, range_m = sigma_polar(scans, TargetOptions())[rows], np.hypot(*points[:, :2].T)
     each = np.arange(len(rows))
-    single = Sightings((), frames, each, np.arctan2(points[:, 1], points[:, 0]), range_m, each, points)
+    azimuth = np.arctan2(points[:, 1], points[:, 0])
+    single = Sightings((), frames, each, azimuth, range_m, each, points, scans.snr_db[rows])
     meetings = _meetings(single, table, camera)
     meetings = meetings.some(np.isfinite(table.cuboids[meetings.boxes, 0]))
     grown_m = (_STANDARD_DEVIATIONS * np.hypot(sigma[:, 0], range_m * sigma[:, 1]))[meetings.sightings]
@@ -740,6 +751,18 @@ def _bearings(camera: Camera, pixels_px: np.ndarray) -> Values:
     """Return the bearing (n,) of pixels (n, 2) [rad], positive to the left; where the lens has none, that of its axis."""
     rays = camera.rays(pixels_px)
     return np.nan_to_num(-np.arctan2(rays[:, 0], rays[:, 2]))
+
+
+def _first_bearings(meetings: _Meetings, start: Bearings | None) -> Bearings:
+    """Return the bearings of the stretch before, unless another turn has clearly more votes: few targets agree on several."""
+    free = Bearings(_turn(meetings), 0.0)
+    if start is None:
+        return free
+    first = np.flatnonzero(np.diff(meetings.sightings, prepend=-1))
+    kept, best = (
+        np.maximum.reduceat(np.maximum(1.0 - meetings.misfits(one), 0.0), first).sum() for one in (start, free)
+    )
+    return start if kept > _KEPT_VOTES * best else free
 
 
 def _turn(meetings: _Meetings) -> float:

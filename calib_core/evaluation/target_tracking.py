@@ -132,6 +132,7 @@ class TargetTrack:
         rows: (n,) its returns, as rows of the recording's RadarScans, ascending.
         scan_of_row: (n,) index of the scan of each.
         points_radar_m: (n, 3) of its returns, as the radar reports them.
+        snr_db: (n,) of its returns; NaN where the radar reports none.
     """
 
     id: str
@@ -141,11 +142,12 @@ class TargetTrack:
     rows: Indices
     scan_of_row: Indices
     points_radar_m: Points3
+    snr_db: Values
 
     def __post_init__(self) -> None:
         sightings, returns = len(self.scans), len(self.rows)
         freeze(self, np.int64, times_ns=(sightings,), scans=(sightings,), rows=(returns,), scan_of_row=(returns,))
-        freeze(self, positions_m=(sightings, 3), points_radar_m=(returns, 3))
+        freeze(self, positions_m=(sightings, 3), points_radar_m=(returns, 3), snr_db=(returns,))
 
 
 _GATE = 14.156413609126675  # the 99.73 % quantile of chi2 with 3 degrees of freedom
@@ -363,4 +365,5 @@ def _track(
         rows=moving.rows[kept],
         scan_of_row=moving.scans.scan_of_return()[kept],
         points_radar_m=moving.scans.points_radar_m[kept],
+        snr_db=moving.scans.snr_db[kept],
     )

@@ -88,9 +88,10 @@ def require_label(text: str, where: str) -> None:
         )
 
 
-Evidence: TypeAlias = Literal["clicked", "imported_proven", "imported_assumed", "automatic"]
+Evidence: TypeAlias = Literal["clicked", "imported_proven", "imported_assumed", "automatic", "carried"]
 """Solved from clicks; read from another tool's file whose meaning a check point, pairs or another calibration proved; read from
-one whose meaning was assumed; solved from clicks of which some or all were placed automatically, and nobody confirmed them.
+one whose meaning was assumed; solved from clicks of which some or all were placed automatically, and nobody confirmed them;
+carried forward from an older calibration by a turn that was watched.
 Reading a file never raises the level it states."""
 
 EVIDENCE_LEVELS: tuple[Evidence, ...] = get_args(Evidence)
@@ -101,6 +102,24 @@ _UNKNOWN: Evidence = "imported_assumed"
 def stated_evidence(text: str) -> Evidence:
     """Return the level that a file states; the weakest if it is none of ours, such as one of a later version."""
     return next((level for level in EVIDENCE_LEVELS if level == text), _UNKNOWN)
+
+
+_Angle = Annotated[float, Meta(ge=-4.0, le=4.0)]
+_Angles = tuple[_Angle, _Angle, _Angle]
+
+
+class CarriedFrom(msgspec.Struct, frozen=True):
+    """The calibration that a pose was carried forward from, and by what turn.
+
+    Attributes:
+        sha256: of the older calibration's file.
+        turn_rad: (3,) of the camera against the radar since: camera_from_radar = Exp(turn) times the older one.
+        covariance_rad2: (3, 3) of that turn.
+    """
+
+    sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    turn_rad: _Angles
+    covariance_rad2: tuple[_Angles, _Angles, _Angles]
 
 
 EQUATION = "p_camera = R p_radar + t"
@@ -234,6 +253,7 @@ class CalibrationFile:
         verdict: how far to trust it, as it was judged when it was solved; None in files of other tools.
         evidence: what the pose rests on, as the file states it; None if it states nothing.
         vehicle: what is stated of the vehicle and its sensors.
+        carried_from: the older calibration, if this one was carried forward; None if it was not.
         corrected: the calibration that this one was made from, if its pose is for radar data as reported, without corrections.
         aed_either_way_px: what `raw_data.aed_either_way` found through the lens, of a file for rectified images; else None.
         made_from_sha256: the SHA-256 of the calibration-1 file that this was made from, if something was changed on the way to
@@ -249,6 +269,7 @@ class CalibrationFile:
     evidence: Evidence | None = None
     made_from_sha256: str = ""
     vehicle: VehicleNote = field(default_factory=VehicleNote)
+    carried_from: CarriedFrom | None = None
     corrected: Calibration | None = None
     aed_either_way_px: tuple[float, float] | None = None
 

@@ -903,6 +903,14 @@ def no_camera() -> Remark:
     )
 
 
+def carried_forward(*, turned_deg: Mapping[str, float], sha256: str) -> Remark:
+    turns = ", ".join(f"{axis} {turn:+.2f}°" for axis, turn in turned_deg.items())
+    return remark(
+        f"carried forward from {sha256[:12]}... by a watched turn ({turns}); pairs and figures are those of the older solve",
+        "it rests on the older calibration and its baseline: write a new baseline, and calibrate again when you can",
+    )
+
+
 SOLVER = by_code(
     agreeing_outliers,
     algorithm_1_contradicted,
@@ -942,7 +950,12 @@ SOLVER = by_code(
     units_suspected,
     weak_geometry,
 )
-ROWS: Mapping[str, Row] = {**SOLVER, **intrinsics.WARNINGS, **evaluation.WARNINGS, **by_code(no_camera)}
+ROWS: Mapping[str, Row] = {
+    **SOLVER,
+    **intrinsics.WARNINGS,
+    **evaluation.WARNINGS,
+    **by_code(no_camera, carried_forward),
+}
 
 
 def warning_remark(warning: DataWarning) -> Remark:

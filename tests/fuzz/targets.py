@@ -33,6 +33,7 @@ from calib_core.recordings.messages.foxglove import HEAD_BYTES, ros_head, ros_me
 from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import epoch_in_name, read_time
+from calib_core.watching.baseline import read_baseline
 from cocalib.session.applying import History, advance, settled
 from cocalib.session.events import ClickExcluded, ClickPlaced, ClicksImported, Undo
 from cocalib.session.file.guarded_folder import SessionFileError
@@ -239,8 +240,8 @@ def _unstated_files(_folder: Path) -> list[bytes]:
 
 def _own(data: bytes, _folder: Path) -> None:
     text = data.decode("utf-8", "surrogateescape")
-    for read in (read_clicks, read_pairs, read_calibration, read_camera, read_board_views):
-        _swallow(lambda read=read: read(text, "input"))
+    for read in (read_clicks, read_pairs, read_calibration, read_camera, read_board_views, read_baseline):
+        _swallow(lambda read=read: read(text, source="input"))
 
 
 def _own_files(_folder: Path) -> list[bytes]:
@@ -253,6 +254,7 @@ def _own_files(_folder: Path) -> list[bytes]:
         _PAIRS,
         _CLICKS,
         _VIEWS,
+        _BASELINE,
         _MERGED,
         b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n",
     ]
@@ -328,6 +330,13 @@ _PAIRS = (
     b'"matrix_px":[[500,0,320],[0,500,240],[0,0,1]]},'
     b'"pairs":[{"id":"p1","radar_m":[5,1,-0.5],"pixel_px":[212.9,239.4],"alternatives_radar_m":[[5,2,0]],"sigma_px":2}]}'
 )
+_BASELINE = json.dumps({
+    "schema": "cocalib/baseline-1", "calibration_sha256": "a" * 64, "recording": "a.bag", "image_size_px": [640, 480],
+    "start": {"sec": 1, "nanosec": 5}, "end": {"sec": 2, "nanosec": 5}, "backgrounds": ["/9j/AAAA"],
+    "still_returns": {"polar": [[9.5, 0.25, 0.0]], "spreads_rad": [[0.01, 0.02]]},
+    "traffic": {"labels": ["car"], "factors": [[[1.0, 1.0], [1.0, 1.0]]], "middle": [0.0] * 5, "gradient": [0.0] * 5,
+                "information": [[float(i == j) for i in range(5)] for j in range(5)], "passages": [3], "seconds": 60.0},
+}).encode()  # fmt: skip
 _CLICKS = b'{"schema":"cocalib/clicks-1","clicks":[{"id":"c1","image_time":{"sec":1700000000,"nanosec":5},"pixel_px":[1.5,2]}]}'
 _VIEWS = (
     b'{"schema":"cocalib/board-views-1","board":{"kind":"checkerboard","columns":9,"rows":6,"square_m":0.025},'

@@ -124,6 +124,15 @@ COMMANDS: Mapping[str, Command] = {
             ),
         ),
         Command(
+            "watch",
+            "cocalib.cli.watch:Watch",
+            "Watch whether camera or radar has turned since a baseline: by the still image, the still returns, and traffic.",
+            (
+                "calibration.json drive.mcap --baseline baseline.json --boxes boxes.json",
+                "calibration.json today.mcap --boxes moving --json",
+            ),
+        ),
+        Command(
             "show",
             "cocalib.cli.show:Show",
             "Show a recording with its calibration in Rerun, or write it to a file: .rrd, or a video.",

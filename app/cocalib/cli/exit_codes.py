@@ -26,6 +26,10 @@ _LAW: Final = (
     ("export", "0 done; 3 contradictory, and nothing is written without --despite-verdict"),
     ("check", "0 agrees or sound; 1 differs or wrong; 2 unreadable; 3 cannot be decided"),
     (
+        "watch",
+        "0 nothing moved, or all alike; 1 camera and radar turned against each other; 3 cannot be told, or a new baseline",
+    ),
+    (
         "batch",
         "0 done; 10 + the number of failed sessions, at most 99; a session in doubt fails only with --require; "
         "status: 3 unless all are solved and none is in doubt",

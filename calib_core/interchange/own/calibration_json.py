@@ -145,6 +145,7 @@ def write_calibration(file: CalibrationFile) -> str:
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
         verdict=file.verdict or UNSET,
         evidence=file.evidence or UNSET,
+        carried_from=file.carried_from or UNSET,
         warnings=[warning_text(warning) for warning in calibration.warnings],
         unpaired=[unpaired_text(click) for click in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
@@ -271,6 +272,7 @@ def _file(
         provenance=provenance_of(document.provenance),
         verdict=document.verdict or None,
         evidence=document.evidence or None,
+        carried_from=document.carried_from or None,
         vehicle=document.vehicle or VehicleNote(),
     )
 

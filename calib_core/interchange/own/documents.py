@@ -14,7 +14,7 @@ from msgspec import UNSET, Meta, Struct, UnsetType, field
 from calib_core.camera import Camera, CameraCovariance, CameraModel
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
-from calib_core.interchange.calibration_file import AssumptionNote, Evidence, VehicleNote
+from calib_core.interchange.calibration_file import AssumptionNote, CarriedFrom, Evidence, VehicleNote
 from calib_core.interchange.rotations import nearest_rotation
 from calib_core.json_forms import Count, Measured, Name, Pixel, Position, Positive, Share
 from calib_core.measurements import ChosenReturn, Mark, TimeNs
@@ -286,6 +286,7 @@ class CalibrationDocument(Struct, frozen=True, kw_only=True):
     check_point: CheckPointDocument | None = None
     verdict: StatedVerdict | UnsetType | None = None
     evidence: Evidence | UnsetType | None = None
+    carried_from: CarriedFrom | UnsetType | None = None
     sigma: SigmaDocument = field(default_factory=SigmaDocument)
     covariance: Matrix66 | None = None
     covariance_convention: str = ""

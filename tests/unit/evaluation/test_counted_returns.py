@@ -49,7 +49,9 @@ def sightings(*paths: tuple[np.ndarray, np.ndarray]) -> Sightings:
     frames, targets, azimuths, ranges = (np.array(column) for column in zip(*rows, strict=True))
     points = np.stack([ranges, np.zeros(len(rows)), np.zeros(len(rows))], axis=1)
     names = tuple(f"target-{i}" for i in range(len(paths)))
-    return Sightings(names, frames, targets, np.deg2rad(azimuths), ranges, np.arange(len(rows)), points)
+    return Sightings(
+        names, frames, targets, np.deg2rad(azimuths), ranges, np.arange(len(rows)), points, np.full(len(rows), np.nan)
+    )
 
 
 def boxes(*paths: np.ndarray, width_px: float = 30.0, tracks: bool = True) -> Boxes:

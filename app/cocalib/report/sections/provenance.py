@@ -18,6 +18,7 @@ _RESTS_ON = {
     "imported_proven": "an import whose meaning a check point, pairs or another calibration proved",
     "imported_assumed": "an import whose meaning is assumed",
     "automatic": "automatic, unconfirmed clicks",
+    "carried": "an older calibration, carried forward by a turn that was watched",
 }
 
 

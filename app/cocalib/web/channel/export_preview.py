@@ -32,6 +32,7 @@ _EVIDENCE: dict[Evidence, str] = {
     "imported_proven": "Imported; a check point, pairs or another calibration proved what its numbers mean",
     "imported_assumed": "Imported; what its numbers mean was assumed, nothing proves it",
     "automatic": "Rests on automatic, unconfirmed clicks",
+    "carried": "Carried forward from an older calibration by a turn that was watched",
 }
 
 

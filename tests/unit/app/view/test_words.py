@@ -123,6 +123,9 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
         "camera-position-contradicted", {"away_cm": 31.0, "sigmas": 7.0, "misread": "position", "unit": "level"}
     ),
     DataWarning("camera-position-doubtful", {"away_cm": 31.0, "sigmas": 3.7, "one_in": 250, "weight": 0.96}),
+    DataWarning(
+        "carried-forward", {"turned_deg": {"pitch": 0.02, "yaw": 1.02, "roll": -0.1}, "sha256": "0123456789abcdef"}
+    ),
     DataWarning("choices-unused", {"clicks": 1}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": 0.4}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": -0.4}),
