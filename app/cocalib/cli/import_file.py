@@ -257,7 +257,7 @@ class Import:
             )
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
         frames, lens = self._frames_and_lens()
-        given = read_camera_file(lens) if lens else None
+        given = read_camera_file(lens, image_size_px=self.image_size) if lens else None
         against = read_any_file(self.against) if self.against else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
         files = frames.files(self.calibration)

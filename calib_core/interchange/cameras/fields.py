@@ -45,10 +45,22 @@ def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamer
         return (_named_numbers(content, source=source),)
     if isinstance(content.get("CameraCalibration"), Mapping):
         return find_cameras(content["CameraCalibration"], source=source)
+    if isinstance(content.get("sensors"), list):
+        return tuple(_sensor_camera(row, source=source) for row in content["sensors"] if _has_matrix(row))
     numbered = [match for key in content if (match := re.fullmatch(r"(?:M|K|cameraMatrix)(\d)", str(key)))]
     return tuple(
         _flat_camera(content, match[0], (f"D{match[1]}", f"distCoeffs{match[1]}"), source=source) for match in numbered
     )
+
+
+def _has_matrix(row: Any) -> bool:
+    """Return whether a row of Astyx' list of sensors is a camera's."""
+    return isinstance(row, Mapping) and isinstance(row.get("calib_data"), Mapping) and "K" in row["calib_data"]
+
+
+def _sensor_camera(row: Mapping[str, Any], *, source: str) -> FoundCamera:
+    name = str(row.get("sensor_uid"))
+    return FoundCamera(name, "pinhole", _matrix(row["calib_data"]["K"], source=source, place=f"{name}.K"), (), None)
 
 
 def _our_camera(content: Mapping[str, Any], *, source: str) -> FoundCamera | None:

@@ -97,6 +97,7 @@ class _Opening:
         self.found: list[tuple[Path, tuple[Path, ...], bool]] = []
         self.refused: list[tuple[Path, str]] = []
         self.sources: list[PlainSource] = []
+        self.calibrations: list[Path] = []
 
     def add(self, path: Path) -> None:
         """Add a path as the user gave it; a data-set folder becomes its contents.
@@ -107,6 +108,7 @@ class _Opening:
         contents = contents_of(path, self.options) if path.is_dir() else Contents([(path, ())], inside=False)
         self.found.extend((inner, files, contents.inside) for inner, files in contents.sources)
         self.refused.extend(contents.refused)
+        self.calibrations.extend(contents.calibrations)
         has_stream = any(file.is_relative_to(path) for file in self.options.taken)
         if not contents.sources and contents.refused and not has_stream:
             raise RecordingError(f"{path}: nothing in it can be used: {_reasons(contents.refused)}")
@@ -136,6 +138,9 @@ class _Opening:
         named = list(self.streams)
         for place in sorted(opened):
             named.append(_with_own_topic(opened[place], [other.channel.topic for other in named]))
+        cameras = [source.camera.file for source in named if source.camera is not None]
+        unused = [one for one in self.calibrations if not any(file.is_relative_to(one) for file in cameras)]
+        self.refused += [(one, "calibrations of no images found; to read one: cocalib import FILE") for one in unused]
         return self._with_refusals(_with_open_times(named, ros=bool(self.left))), tuple(self.left)
 
     def _open(
@@ -246,12 +251,14 @@ class Contents:
     Attributes:
         sources: folders with their files, and single files with none.
         refused: what was looked at and not used, with the reason.
+        calibrations: folders of calibrations, which are read with the images beside them.
         is_ros: whether it is, or directly contains, a ROS recording.
         inside: whether the sources stand below the folder rather than being it.
     """
 
     sources: list[tuple[Path, tuple[Path, ...]]] = field(default_factory=list)
     refused: list[tuple[Path, str]] = field(default_factory=list)
+    calibrations: list[Path] = field(default_factory=list)
     is_ros: bool = False
     inside: bool = True
 
@@ -348,7 +355,8 @@ def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -
         _add_files(folder, files, folders, contents, options)
     for inner in folders:
         if inner.name.lower() in _CALIBRATIONS:
-            continue  # read with the images beside it
+            contents.calibrations += [inner] if inner.name.lower().startswith("calib") else []
+            continue
         reason = _unwalked(folder, inner, depth)
         if reason:
             contents.refused.append((inner, reason))

@@ -10,11 +10,10 @@ measured at the origin of their frame, and at the mount of the radar in it, by t
 
 Where no mount is known, or it explains nothing, the place is looked for: two neighbouring returns in one bin of range are equally
 far from it, so it is on the plane between them.
-
-The nearest return and the sector of bearings are shown, and decide nothing: a scene may be empty near the radar.
 """
 
 from dataclasses import dataclass
+from math import lgamma
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy as np
 from calib_core.arrays import Points3, Values, Vector3
 from calib_core.geometry import RigidTransform, rotation_from_euler
 from calib_core.measurements import DataWarning, RadarScans
-from calib_core.radar import direction_cosines, polar_from_cartesian
+from calib_core.radar import direction_cosines
 from calib_core.recordings.radar.scan_stream import RadarStream
 
 Origin: TypeAlias = Literal["sensor", "body", "unknown"]
@@ -72,15 +71,11 @@ class OriginFigures:
     """What returns show about one place from which they may have been measured.
 
     Attributes:
-        nearest_m: the nearest return.
-        sector_deg: the bearings of all but 1 % of the returns, from and to, positive to the left.
         bins: what bins of range and azimuth explain [nats].
         behind: share of the places that are behind the antenna.
         doppler_mps: how well one velocity a scan explains the speeds; NaN if the vehicle stands, or they are unknown.
     """
 
-    nearest_m: float
-    sector_deg: tuple[float, float]
     bins: float
     behind: float
     doppler_mps: float
@@ -213,7 +208,8 @@ def origin_of(
     else:
         log_ratio = min(_bins(_ELSEWHERE @ points, step_m) - figures[0].bins, 0.0)
     place_m = None
-    if mount is None or abs(log_ratio) < _SURE:
+    # Bins that explain a nat a return about the origin are the radar's own: no other place is looked for.
+    if abs(log_ratio) < _SURE or (mount is None and log_ratio > -len(points)):
         place_m, by_place = _measured_at(points, step_m)
         place_m, log_ratio = (place_m, by_place) if by_place > _SURE else (None, log_ratio)
     by_data: Origin = "unknown" if abs(log_ratio) < _SURE else "body" if log_ratio > 0.0 else "sensor"
@@ -222,13 +218,9 @@ def origin_of(
 
 def _figures(scans: RadarScans, points: Points3, step_m: float) -> OriginFigures:
     """Measure returns about a place, given their positions (n, 3) from there."""
-    polar = polar_from_cartesian(points)
-    low, high = np.rad2deg(np.quantile(polar[:, 1], [0.005, 0.995])).tolist()
     places = np.unique(np.round(points / _PLACE_M), axis=0)
     behind = float((places[:, 0] < 0.0).mean())
-    return OriginFigures(
-        float(polar[:, 0].min()), (low, high), _bins(points, step_m), behind, _misfit_mps(scans, points)
-    )
+    return OriginFigures(_bins(points, step_m), behind, _misfit_mps(scans, points))
 
 
 def _log_ratio(scans: RadarScans, origin: OriginFigures, mount: OriginFigures) -> float:
@@ -300,15 +292,15 @@ def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
 
 def _repeats(values: Values, step: float) -> float:
     """Return by how much the best Dirichlet-multinomial code of values in cells of a step beats one of equal cells [nats]."""
-    from scipy.special import gammaln
-
     cells, count = max(float(np.ptp(values)) / step, 2.0), len(values)
     times, how_many = np.unique(np.unique(np.round(values / step), return_counts=True)[1], return_counts=True)
     lengths = [
-        gammaln(a * cells + count) - gammaln(a * cells) - float(how_many @ (gammaln(times + a) - gammaln(a)))
-        for a in _REPEATING
+        lgamma(a * cells + count)
+        - lgamma(a * cells)
+        - sum(n * (lgamma(time + a) - lgamma(a)) for time, n in zip(times.tolist(), how_many.tolist(), strict=True))
+        for a in _REPEATING.tolist()
     ]
-    return max(count * float(np.log(cells)) - float(min(lengths)), 0.0)
+    return max(count * float(np.log(cells)) - min(lengths), 0.0)
 
 
 def _misfit_mps(scans: RadarScans, points: Points3) -> float:

@@ -180,6 +180,14 @@ def test_a_missing_image_size_is_taken_from_the_recording():
         read_camera(text, image_size_px=(960, 720))
 
 
+def test_the_camera_of_astyx_is_found_among_its_sensors():
+    radar = {"sensor_uid": "radar_6455", "calib_data": {"T_to_ref_COS": np.eye(4).tolist()}}
+    camera = {"sensor_uid": "camera_front", "calib_data": {"K": [[700, 0, 320], [0, 700, 240], [0, 0, 1]]}}
+    found = read_camera(json.dumps({"sensors": [radar, camera]}), image_size_px=(640, 480))
+
+    assert (found.model, found.matrix_px[0, 0], found.width_px) == ("pinhole", 700.0, 640)
+
+
 def test_what_opencv_writes_is_read(tmp_path):
     import cv2
 

@@ -722,6 +722,8 @@ def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
         (tmp_path / "ars548" / f"{number:06}.bin").write_bytes(rows.tobytes())
     (tmp_path / "maps").mkdir()
     np.save(tmp_path / "maps" / "000000.npy", np.zeros((4, 4)))
+    (tmp_path / "calib").mkdir()
+    (tmp_path / "calib" / "000000.txt").write_text("P2: 1 2 3\n")
     with inspect_recording(tmp_path) as recording:
         assert (recording.image_topic, recording.radar_topic) == ("/stereo/image", None)
         (warning,) = (one for one in recording.warnings if one.code == "unused-files")
@@ -730,6 +732,7 @@ def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
         "documentary (no times in the file names",
         "ars548 (its 4 .bin files fit no layout of radar returns",
         "maps (1 .npy files, which are not read",
+        "calib (calibrations of no images found; ",
     ):
         assert words in warning.facts["message"]
 
