@@ -116,7 +116,8 @@ def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: f
 
     Args:
         scans: of a whole recording; novelty is judged against the rest of it. A reflector that stays at one place for
-            more than half of the recording is taken for part of the scene.
+            more than half of the recording is taken for part of the scene, unless the recording has several pieces, such as
+            one bag for each placement.
         options: which returns are static and in range.
         min_dwell_s: the shortest placement [s].
     """
@@ -269,7 +270,8 @@ _SEED_GAP_S = 1.2  # within one cell, because the returns may alternate between 
 _SEED_SHARE_OF_DWELL = 0.5
 _LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
 _MOST_PRESENCE_OUTSIDE = 0.25  # the same for the rest of the recording, relative to the dwell's
-_MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
+_MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene, unless a piece of the recording does not show it
+_BETWEEN_PIECES_S = 2.0  # without scans: another bag, in which the reflector stands elsewhere
 _MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
 _BEFORE_S = (0.5, 1.5)  # before a dwell's start, or after its end: scans there show that it had not begun
 _MOST_SEEDS = 4000
@@ -452,7 +454,8 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
     as_strong = members[~(grid.snr_db[members] < strong_db - _WEAKER_DB)]
     shown = np.unique(grid.scan[as_strong])
     presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
-    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
+    in_pieces = bool((np.diff(grid.times_s) > _BETWEEN_PIECES_S).any())
+    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1] and not in_pieces
     if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
         return None
     position_radar_m = np.median(grid.points_radar_m[mine], axis=0)

@@ -70,6 +70,8 @@ const SHOW = { key: "J", label: "show", action: "worst" };
 const POSITION = { key: "", label: "enter the camera position", option: "solving.camera_position" };
 const LENS = { key: "", label: "open Lens", action: "lens" };
 const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
+const TOGETHER = { key: "", label: "open recordings together", action: "recording" };
+const JUDGE = { key: "", label: "judge a calibration", action: "evaluate" };
 /** @type {Words} */
 const BEYOND = ["No radar return within the maximum range.", RANGE];
 const NEXT = { key: "N", label: "next placement", action: "next-placement" };
@@ -100,7 +102,7 @@ const RULES = [
   { name: "verdict", when: () => clicks().length, say: ({ verdict, open }) => [said(verdict.action), ...does(verdict), ...onward(open)] },
   { name: "searching", when: () => !state.placementsKnown, say: () => ["Looking for placements. You can click meanwhile."] },
   { name: "first", when: () => state.placements.length, say: ({ verdict }) => [said(verdict.action)] },
-  { name: "none", when: () => true, say: ({ verdict }) => [`${state.placementSummary}. ${said(verdict.action)}`] },
+  { name: "none", when: () => true, say: ({ verdict }) => [`${state.placementSummary}. ${said(verdict.action)}`, TOGETHER, JUDGE] },
 ];
 
 /** @param {import("../base/state.js").Placement[]} open @returns {Words} */

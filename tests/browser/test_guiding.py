@@ -55,6 +55,16 @@ def test_a_maximum_range_that_leaves_all_returns_out_is_named_with_its_field(pag
     assert page.value("document.activeElement.id") == "option-gating-max_range_m"
 
 
+def test_a_recording_without_placements_says_what_it_is_good_for(page: Driver) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.value("void (__cocalib.state.placements = [], __cocalib.state.view.verdict.key = '')")
+    page.go_to(3)
+    assert rule(page) == "none"
+    assert page.page.locator("#guide .do").count() == 2
+    page.page.locator("#guide .do").first.click()
+    page.until("document.getElementById('opening-dialog').open")
+
+
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 2)

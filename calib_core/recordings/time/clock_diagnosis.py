@@ -265,6 +265,9 @@ def clock_warnings(diagnosises: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                 f"{' and '.join(one.topic for one in apart)} have {apart[0].islands} stretches of data each, separated by up to "
                 f"{span_text(max(one.longest_gap_s for one in apart))}"
             )
-        hint = "click only where both sensors have data; if there should be no gaps, files may be missing"
+        hint = (
+            "click only where both sensors have data; bags of one placement each are right; if there should be no "
+            "gaps, files may be missing"
+        )
         warnings.append(DataWarning.reported("islands", listed, hint))
     return warnings

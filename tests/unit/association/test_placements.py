@@ -142,6 +142,19 @@ def test_two_reflectors_that_fill_a_piece_are_two_placements_and_a_second_echo_i
     assert min(abs(one.position_radar_m[0] - REFLECTOR[0]) for one in placements) < 0.1
 
 
+def test_bags_of_one_placement_each_are_placements_however_long_one_is():
+    scans, ends_s = [], (0.0, 60.0, 82.0, 104.0)
+    wall = (15.0, 4.0, -0.5)
+    for before_s, end_s, place in zip(
+        ends_s, ends_s[1:], ((6.0, 1.0, -0.8), (9.0, -2.0, -0.8), (12.0, 3.0, -0.8)), strict=False
+    ):
+        start_s = before_s + 10.0 if before_s else 0.0
+        bag = scans_with([(start_s, end_s, place, 29.0), (start_s, end_s, wall, 25.0)], length_s=end_s)
+        scans += [bag.scan(i) for i in np.flatnonzero(bag.times_ns >= start_s * NS_PER_S)]
+    found = find_placements(RadarScans.from_scans(scans), GatingOptions())
+    assert [round(float(one.position_radar_m[0])) for one in found] == [6, 9, 12]
+
+
 def test_a_dwell_that_somebody_hides_for_a_moment_is_one_placement():
     (placement,) = found_in((10.0, 15.0, REFLECTOR, 25.0), (17.0, 23.0, REFLECTOR, 25.0))
     assert (placement.start / NS_PER_S, placement.end / NS_PER_S) == pytest.approx((10.0, 23.0), abs=0.5)

@@ -330,10 +330,14 @@ def placement_summary(rows: Sequence[PlacementRow], length_s: float) -> str:
         length_s: of the recording [s].
     """
     if length_s < SHORTEST_S:
-        return f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer"
+        return (
+            f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer: it can show a "
+            "calibration, and judge it"
+        )
     if not rows:
         return (
-            f"No placement found: nothing appeared, stood still for {SHORTEST_S:.0f} s or longer, and went away again"
+            f"No placement found: nothing appeared, stood still for {SHORTEST_S:.0f} s or longer, and went away again. If a "
+            "reflector stood all the time, open the recordings of all placements together"
         )
     ranges = [row.range_m for row in rows]
     words = [
