@@ -54,10 +54,10 @@ export function rampColour(share, ramp = RESIDUALS) {
 export const themeColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 /** The small text of canvases, which grows on a 4K monitor as that of the page does [CSS px]. */
-export const smallPx = () => (innerWidth >= 2800 ? 15 : 11);
+export const smallPx = () => (innerWidth >= 2800 ? 16 : 12);
 
 /** How much larger marks are on a 4K monitor. */
-export const growth = () => smallPx() / 11;
+export const growth = () => smallPx() / 12;
 
 /** Its font, for a canvas with so many pixels per CSS px. @param {number} [ratio] @param {"600"|""} [weight] */
 export const smallFont = (ratio = 1, weight = "") => `${weight} ${smallPx() * ratio}px ${themeColour("face")}`;

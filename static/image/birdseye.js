@@ -31,7 +31,7 @@ function startBirdseye() {
   attemptFirst("zoom-out", () => state.looking && zoomEye(0.8));
   new ResizeObserver(() => (view.fitted ? fitView() : redraw())).observe(canvas);
   on(["radar_map", "placements", "recording"], () => view.fitted && fitView());
-  on(["look", "cursor", "theme", "layers"], redraw);
+  on(["look", "overlay", "cursor", "theme", "layers"], redraw);
   canvas.addEventListener("pointerdown", (event) => {
     press = { x: event.offsetX, y: event.offsetY, moved: false };
     canvas.setPointerCapture(event.pointerId);
@@ -75,8 +75,11 @@ export const toCanvas = (x, y) => [canvas.clientWidth / 2 - (y - view.y) * view.
 /** @param {number} x @param {number} y CSS px @returns {[number, number]} */
 const toRadar = (x, y) => [view.x - (y - canvas.clientHeight / 2) / view.scale, view.y - (x - canvas.clientWidth / 2) / view.scale];
 
+/** The returns of the last seconds, or beside an image those of its scan. @returns {Return[]} */
+const returnsNow = () => (state.looking ? state.look?.returns : state.overlay?.returns) ?? [];
+
 function redraw() {
-  if (waiting || !state.looking) return;
+  if (waiting || !canvas.clientWidth) return; // it is not on screen
   waiting = true;
   requestAnimationFrame(() => {
     waiting = false;
@@ -87,7 +90,7 @@ function redraw() {
     pen.clearRect(0, 0, width, height);
     if (state.lookOptions.map) drawMap();
     drawGrid();
-    for (const seen of state.look?.returns ?? []) drawReturn(seen);
+    for (const seen of returnsNow()) drawReturn(seen);
     drawPlacements();
   });
 }
@@ -218,7 +221,7 @@ function placementNear(event) {
 /** Explain the return, the placement or the place under the pointer. @param {PointerEvent} event */
 function explain(event) {
   const lines = [];
-  const [nearest] = (state.look?.returns ?? [])
+  const [nearest] = returnsNow()
     .map((seen) => ({ seen, far: Math.hypot(toCanvas(seen[6], seen[7])[0] - event.offsetX, toCanvas(seen[6], seen[7])[1] - event.offsetY) }))
     .filter(({ far }) => far <= REACH)
     .sort((a, b) => a.far - b.far || a.seen[9] - b.seen[9]);

@@ -204,7 +204,8 @@ function askPosition(field) {
     positionDialog.close();
     change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sigma.value) });
   };
-  const { left = 0, top = 0 } = document.activeElement?.getBoundingClientRect() ?? {};
+  const button = document.activeElement === document.body ? document.getElementById("guide") : document.activeElement;
+  const { left = 0, top = 0 } = button?.getBoundingClientRect() ?? {};
   positionDialog.replaceChildren(form);
   positionDialog.showModal();
   positionDialog.style.left = `${Math.max(8, Math.min(left, innerWidth - positionDialog.offsetWidth - 8))}px`;

@@ -35,7 +35,7 @@ export function startGuide() {
 function keyPart({ key, label, action, pair, frame, option }) {
   const parts = [...(key ? [make("kbd", "key", key)] : []), label];
   if (!action && !pair && !option && frame === undefined) return make("span", "", parts);
-  const button = make("button", "do", parts);
+  const button = make("button", action === "place-mark" ? "do primary" : "do", parts);
   button.onmousedown = (event) => event.preventDefault();
   button.onclick = () => (pair ? goToPair(pair) : frame !== undefined ? comeTo(frame) : option ? openOption(option) : act(actionNamed(action ?? "")));
   return button;

@@ -33,6 +33,11 @@ const [PLAYING_EVERY, LOOKING_EVERY] = [1000, 340];
 /** When the 3D view is loaded at the latest, counted from the recording's description: its first frame may be unreadable [ms]. */
 const LATEST = 3000;
 
+/** After so long without a drawing, the returns are shown from above instead [ms]. */
+const PATIENCE = 10_000;
+const birdseye = /** @type {HTMLElement} */ (document.getElementById("birdseye"));
+const whyFlat = make("p", "space-why", "");
+
 /** What the Camera view says before it can place the returns. */
 const NO_POSE = "No pose yet: the returns appear here once enough placements are clicked.";
 
@@ -80,7 +85,7 @@ export function startSpace(listen) {
   on(["theme"], tint);
   on(["recording", "layers"], () => (arrange(), drawBar()));
   on(["cursor", "shown"], drawStanding);
-  onDrawn(() => (drawBar(), drawStanding(), drawReadout(null)));
+  onDrawn(() => (flatten(""), drawBar(), drawStanding(), drawReadout(null)));
   arrange();
   on(["shown", "look"], () => requestAnimationFrame(() => setTimeout(load)));
   on(["recording"], () => setTimeout(load, LATEST));
@@ -88,7 +93,18 @@ export function startSpace(listen) {
 
 /** Load viser's page, once: it is large, and the first image comes before it. */
 function load() {
-  if (!frame.hasAttribute("src")) frame.src = `viser/${tab}/`;
+  if (frame.hasAttribute("src") || whyFlat.textContent) return;
+  if (!document.createElement("canvas").getContext("webgl2")) return flatten("No 3D view: this browser has no WebGL2.");
+  frame.src = `viser/${tab}/`;
+  setTimeout(() => frameShown() === null && flatten(`No 3D view: nothing was drawn within ${PATIENCE / 1000} s.`), PATIENCE);
+}
+
+/** Show the returns from above in the place of the 3D view, or that again. @param {string} why "" once the 3D view has drawn */
+function flatten(why) {
+  if (why === whyFlat.textContent) return;
+  whyFlat.textContent = why;
+  pane.classList.toggle("flat", why !== "");
+  if (!state.looking) (why ? pane : document.getElementById("image-pane"))?.append(birdseye);
 }
 
 /** Take what the server says about the 3D view. @param {import("../messages.js").SpaceFrame} look */
@@ -108,7 +124,7 @@ function startChips() {
   colours.dataset.hint = "What the colours of the returns mean";
   colours.onchange = () => change({ colour: /** @type {Colour} */ (colours.value) });
   readout.setAttribute("role", "status");
-  pane.append(make("div", "space-bar", [legend, standing]), readout);
+  pane.append(make("div", "space-bar", [legend, standing]), readout, whyFlat);
 }
 
 /** @param {string} label @param {string} hint @param {() => void} action */

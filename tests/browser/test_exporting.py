@@ -365,13 +365,13 @@ def nothing_spills(page: Driver) -> None:
     """Check that no part of the panel leaves the screen, and that the table of numbers stays in its column."""
     page.until(f"document.querySelector('{DIALOG} .frames')")
     page.drawn()
-    parts = ", ".join(f"{DIALOG} {part}" for part in ("", ".foot *", "aside :not(image)", ".names *", ".rectified *"))
+    parts = ", ".join(f"{DIALOG} {part}" for part in ("", ".foot *", ".side :not(image)", ".names *", ".rectified *"))
     spilled = page.value(
         f"[...document.querySelectorAll('{parts}')].filter((part) => {{ const box = part.getBoundingClientRect(); "
         "return box.width && (box.right > innerWidth || box.left < 0); }).length"
     )
     assert spilled == 0
-    panel = page.page.locator(f"{DIALOG} aside").bounding_box()
+    panel = page.page.locator(f"{DIALOG} .side").bounding_box()
     table = page.page.locator(f"{DIALOG} .pose-numbers").first.bounding_box()
     assert panel is not None
     assert table is not None

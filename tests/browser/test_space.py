@@ -57,6 +57,19 @@ def test_steady_input_does_not_keep_the_view_from_being_drawn(page: Driver) -> N
     page.until(SETTLED)
 
 
+def test_without_webgl_the_pane_says_so_and_shows_the_returns_from_above(
+    open_page: Callable[..., Driver], server: RunningServer
+) -> None:
+    none = "const made = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = "
+    none += "function (kind, ...more) { return kind === 'webgl2' ? null : made.call(this, kind, ...more); };"
+    page = open_page(server.url, viewport=SMALL, script=none)
+    page.until("document.querySelector('.space-why').textContent.includes('WebGL2')")
+    assert page.page.locator("#space #birdseye").is_visible()
+    assert page.page.get_attribute("#space-view", "src") is None
+    page.until("__cocalib.state.placementsKnown")
+    assert page.value("document.getElementById('birdseye').width") > 0
+
+
 def open_views(page: Driver) -> None:
     """Show what the 3D view can be looked at from, and its colours."""
     page.value("document.querySelector('.over-space').open = true")
