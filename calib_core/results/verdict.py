@@ -384,6 +384,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "flat-radar",
         "choices-unused",
         "uncertain-association",
+        "camera-turned",
         "smooth-angle-errors",
         "lens-or-radar-scale",
         _NOT_MIRRORED,

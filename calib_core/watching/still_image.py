@@ -60,12 +60,17 @@ def background(images: Sequence[np.ndarray]) -> np.ndarray | None:
     Args:
         images: uint8 (h, w, 3), blue first.
     """
-    import cv2
-
     if len(images) < _FEWEST_FRAMES:
         return None
     median = background_of([reduced(image) for image in images]).median
-    return np.asarray(cv2.cvtColor(np.clip(median, 0.0, 255.0).astype(np.uint8), cv2.COLOR_BGR2GRAY))
+    return reduced_grey(np.clip(median, 0.0, 255.0).astype(np.uint8))
+
+
+def reduced_grey(image: np.ndarray) -> np.ndarray:
+    """Return an image (h, w, 3) as uint8 grey of at most 480 pixels across."""
+    import cv2
+
+    return np.asarray(cv2.cvtColor(reduced(image), cv2.COLOR_BGR2GRAY))
 
 
 def camera_turn(before: np.ndarray, after: np.ndarray, camera: Camera) -> Turn | None:
@@ -78,6 +83,8 @@ def camera_turn(before: np.ndarray, after: np.ndarray, camera: Camera) -> Turn |
     """
     import cv2
 
+    if before.shape != after.shape:
+        return None
     found = _followed(_even(before), _even(after))
     if found is None:
         return None

@@ -903,6 +903,29 @@ def no_camera() -> Remark:
     )
 
 
+def camera_turned(*, turned_deg: float, last_s: float, first_s: float, ids: Sequence[str], before: bool) -> Remark:
+    """Given when the still image shows that the camera turned between two placements, by more than a click is off by.
+
+    Could also be: a camera that was moved by centimetres.
+    """
+    return remark(
+        say(
+            "the camera turned {turned:.2f}° between {last} and {first} after the first click; {ids} {side} it",
+            turned=turned_deg,
+            last=_clock(last_s),
+            first=_clock(first_s),
+            ids=listed(ids),
+            side="are before" if before else "are after",
+        ),
+        "solve the placements before and after it on their own, with the others excluded, and fasten the camera",
+        ReviewPairs(tuple(ids)),
+    )
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds // 60):02d}:{int(seconds % 60):02d}"
+
+
 def carried_forward(*, turned_deg: Mapping[str, float], sha256: str) -> Remark:
     turns = ", ".join(f"{axis} {turn:+.2f}°" for axis, turn in turned_deg.items())
     return remark(
@@ -919,6 +942,7 @@ SOLVER = by_code(
     camera_far_away,
     camera_position_contradicted,
     camera_position_doubtful,
+    camera_turned,
     choices_unused,
     clock_bias_suspected,
     clocks_apart,

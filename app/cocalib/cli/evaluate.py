@@ -122,6 +122,7 @@ class Evaluate:
 
     def _evaluation(self, path: Path) -> "tuple[ImportedCalibration, Calibration, Evaluation]":
         from cocalib.evaluation.recording_check import judged_calibration
+        from cocalib.solving.solving import camera_turned_warnings
 
         options = self.judging.evidence.options()
         camera = self.judging.read_camera()
@@ -132,7 +133,8 @@ class Evaluate:
             )
             evaluation = self._evaluate(judged.calibration, recording, clicks, boxes, labels, options)
             tell_choices(recording)
-            found = replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
+            turned = camera_turned_warnings(recording, clicks, judged.calibration.camera, options.solving)
+            found = replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings, *turned))
             return judged.found, judged.calibration, found
 
     def _evaluate(

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from calib_core.association.pairing import RadarSource, half_window_s, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
-from calib_core.errors import InputError, OptionError
+from calib_core.errors import InputError, MessageError, OptionError
 from calib_core.input_files import name_text, text_of
 from calib_core.interchange.calibration_file import (
     MOST_CHARACTERS,
@@ -37,6 +38,8 @@ from calib_core.recordings.radar.returns_origin import mount_numbers
 from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import lost_data, lost_returns
+from calib_core.watching.still_image import Turn, camera_turn, reduced_grey
+from calib_core.watching.turned_camera import MOST_IMAGES, camera_turned
 from calib_core.words.warnings import warning_remark
 from cocalib.platform.resources import version
 from cocalib.session.state import Outcome
@@ -109,7 +112,47 @@ def solve_in_steps(
     for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
         if of_recording and isinstance(outcome, Calibration):
             outcome = dataclasses.replace(outcome, warnings=(*of_recording, *outcome.warnings))
+        if isinstance(outcome, Calibration) and not outcome.checking and isinstance(recording, Recording):
+            turned = camera_turned_warnings(recording, clicks, camera, options)
+            outcome = dataclasses.replace(outcome, warnings=(*outcome.warnings, *turned)) if turned else outcome
         yield _with_lost_data(outcome, recording, clicks, options) if isinstance(recording, Recording) else outcome
+
+
+_greys: WeakKeyDictionary[Recording, dict[int, np.ndarray | None]] = WeakKeyDictionary()
+_turns: WeakKeyDictionary[Recording, dict[tuple[int, int], Turn | None]] = WeakKeyDictionary()
+"""What was decoded and registered before: on the page, a click brings one image."""
+
+
+def camera_turned_warnings(
+    recording: Recording, clicks: Sequence[ReflectorClick], camera: Camera, options: CalibrationOptions
+) -> tuple[DataWarning, ...]:
+    """Warn if the camera turned between the images that were clicked; silent where the rig moves."""
+    every = sorted({click.image_time for click in clicks if click.counts})
+    times = (
+        [every[i] for i in np.unique(np.linspace(0, len(every) - 1, MOST_IMAGES).round().astype(int))] if every else []
+    )
+    indices = {time: int(np.searchsorted(recording.image_times, time)) for time in times}
+    frames = {time: grey for time, i in indices.items() if (grey := _grey(recording, i)) is not None}
+    if len(frames) < 2:
+        return ()
+    first, turns = min(frames), _turns.setdefault(recording, {})
+    for time, grey in frames.items():
+        key = indices[first], indices[time]
+        if key not in turns:
+            turns[key] = camera_turn(frames[first], grey, camera)
+    found = {time: turns[indices[first], indices[time]] for time in frames}
+    return camera_turned(found, clicks, camera, sigma_px=options.noise.sigma_px)
+
+
+def _grey(recording: Recording, index: int) -> np.ndarray | None:
+    """Return a frame, reduced and grey; None if it cannot be read."""
+    known = _greys.setdefault(recording, {})
+    if index not in known:
+        try:
+            known[index] = reduced_grey(recording.image(index))
+        except (MessageError, IndexError):
+            known[index] = None
+    return known[index]
 
 
 def _with_lost_data(

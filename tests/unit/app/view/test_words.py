@@ -126,6 +126,10 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning(
         "carried-forward", {"turned_deg": {"pitch": 0.02, "yaw": 1.02, "roll": -0.1}, "sha256": "0123456789abcdef"}
     ),
+    DataWarning(
+        "camera-turned",
+        {"turned_deg": 0.171, "last_s": 40.0, "first_s": 2590.0, "ids": ("c1", "c2"), "before": True},
+    ),
     DataWarning("choices-unused", {"clicks": 1}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": 0.4}),
     DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": -0.4}),
