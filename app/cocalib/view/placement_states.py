@@ -136,8 +136,14 @@ def _unlikely(session: Session, seen: SeenPlacements, numbers: list[int]) -> lis
         for i, pixel, covariance in zip(numbers, pixels, covariances, strict=True)
         if not np.isfinite(pixel).all()
         or not _within(np.clip(pixel, 0, size - 1.0)[None] - pixel, covariance)
-        or (i in seen.spots and not _within(_unmarked(session, seen, i) - pixel, covariance))
+        or (i in seen.spots and not _within(_left(session, seen, i) - pixel, covariance))
     ]
+
+
+def _left(session: Session, seen: SeenPlacements, number: int) -> Points2:
+    """Return the spots (k, 2) of a placement that no mark is on."""
+    spots = seen.spots[number]
+    return spots.pixels_px[unmarked(spots, seen.placements[number], session.clicks)]
 
 
 def _within(away_px: Points2, covariance_px2: Points2) -> bool:
@@ -146,18 +152,12 @@ def _within(away_px: Points2, covariance_px2: Points2) -> bool:
     return bool((squared <= CHI2_999_2).any())
 
 
-def _unmarked(session: Session, seen: SeenPlacements, number: int) -> Points2:
-    """Return the spots of a placement that no mark of its time is on."""
-    placement, spots = seen.placements[number], seen.spots[number]
-    marks = _marks(session.clicks, placement)
-    apart = np.linalg.norm(spots.pixels_px[:, None] - marks[None], axis=2)
-    return np.asarray(spots.pixels_px[(apart > _ON_MARK * spots.width_px).all(axis=1)])
-
-
-def _marks(clicks: Sequence[ReflectorClick], placement: Placement) -> Points2:
-    here = [
+def unmarked(spots: Spots, placement: Placement, clicks: Sequence[ReflectorClick]) -> Flags:
+    """Return which spots (k,) of a placement no mark of its time is on."""
+    marks = [
         (click.u_px, click.v_px)
         for click in clicks
         if click.counts and placement.start <= click.image_time <= placement.end
     ]
-    return np.array(here, dtype=np.float64).reshape(-1, 2)
+    away_px = spots.pixels_px[:, None] - np.array(marks, dtype=np.float64).reshape(1, -1, 2)
+    return np.asarray((np.linalg.norm(away_px, axis=2) > _ON_MARK * spots.width_px).all(axis=1))

@@ -13,7 +13,7 @@ from calib_core.proposing import DwellView, Proposal
 from calib_core.proposing.dwell_views import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
-from cocalib.view.placement_states import SeenPlacements, Spots, is_dismissed
+from cocalib.view.placement_states import SeenPlacements, Spots, is_dismissed, unmarked
 from cocalib.view.wording import sentence
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
@@ -194,9 +194,9 @@ class ProposingService:
         stage = "failed" if problem else now.progress.stage
         number = {id(one): self._numbers[at] for at, one in enumerate(self._placements or ())}
         rows = tuple(
-            self._row(one, number[id(one.placement)], now)
+            row
             for one in now.proposals.ranked
-            if id(one.placement) in number
+            if id(one.placement) in number and (row := self._row(one, number[id(one.placement)], now)).places
         )
         without = tuple(
             UnproposedRow(number[id(one)], reason) for one, reason in now.proposals.unproposed if id(one) in number
@@ -204,13 +204,17 @@ class ProposingService:
         return ProposalNews(True, replace(now.progress, stage=stage, problem=problem, hint=hint), rows, without)
 
     def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
+        """Return a proposal without the places that are marked already; without any, it is none."""
         view: DwellView = next(one for one in now.views if one.placement is proposal.placement)
+        spots = Spots(np.array([candidate.pixel_px for candidate in proposal.candidates]), view.width_px)
+        free = unmarked(spots, proposal.placement, self._workspace.session.clicks)
         places = tuple(
             ProposalPlace(
                 (round(candidate.pixel_px[0].item(), 3), round(candidate.pixel_px[1].item(), 3)),
                 round(candidate.sigma_px, 3),
             )
-            for candidate in proposal.candidates
+            for candidate, is_free in zip(proposal.candidates, free.tolist(), strict=True)
+            if is_free
         )
         return ProposalRow(
             placement=placement,

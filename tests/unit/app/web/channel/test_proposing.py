@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import TimeNs
-from calib_core.proposing import ViewProgress
-from cocalib.session.events import PlacementDismissed
+from calib_core.proposing import Proposals, ViewProgress
+from cocalib.session.events import ClickPlaced, PlacementDismissed
 from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.proposing import ProposingService
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
@@ -46,7 +46,7 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 def found(monkeypatch: pytest.MonkeyPatch) -> None:
     def find(*_: object, progress: Any, **__: object) -> Any:
         progress(ViewProgress(len(PLACEMENTS), len(PLACEMENTS), DRAWN.views))
-        return DRAWN.views, None
+        return DRAWN.views, Proposals(())
 
     monkeypatch.setattr("cocalib.proposing.find_proposals", find)
 
@@ -104,9 +104,25 @@ def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace
     at_desk(workspace, visit)
 
 
+def test_a_place_that_carries_a_mark_is_not_offered(workspace):
+    async def visit(desk: ProposingService, told: list[Any]) -> None:
+        desk.surveyed(PLACEMENTS)
+        news = await until(told, lambda one: one.progress.stage == "ready" and bool(one.rows))
+        row, width_px = news.rows[0], news.rows[0].width_px
+        workspace.dispatch(ClickPlaced(row.image_time.time, row.places[0].pixel_px, "clicked"))
+        desk.switch(ProposingSwitch(on=True))  # tells the pages again
+        count = len(told)
+        await until(told, lambda _: len(told) > count)
+        for other in told[-1].rows:
+            apart_px = [np.hypot(*np.subtract(at.pixel_px, row.places[0].pixel_px)) for at in other.places]
+            assert other.placement != row.placement or min(apart_px) > 0.5 * width_px
+
+    at_desk(workspace, visit)
+
+
 def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeypatch):
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
-    monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, None))
+    monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, Proposals(())))
     time = views[1].image_time
 
     async def visit(desk: ProposingService, told: list[Any]) -> None:
