@@ -5,12 +5,14 @@ font from elsewhere and a site of more than 10 MB.
 """
 
 import argparse
+import hashlib
 import json
 import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import calib_core
@@ -20,15 +22,18 @@ from cocalib.cli.help import named_options_help, short_help
 _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
 _PAGES = {
-    "Tour": "tour gallery first-steps examples",
-    "How to": "radar-formats intrinsics drift watch fleet proposals boxes evaluation report rerun simulation",
-    "Concepts": "method conventions GLOSSARY apex paper reliability security",
+    "Get started": "tour first-steps examples gallery",
+    "How to": "radar-formats intrinsics proposals evaluation boxes drift watch fleet report rerun simulation",
+    "Concepts": "method conventions apex paper reliability security GLOSSARY",
     "Reference": "commands python formats warnings",
-    "Studies": "accuracy paper-experiments speed",
-    "Project": "CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
+    "Project": "accuracy paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
-_FONT = "system-ui, sans-serif"
-_INLINE = re.compile(r"<script>document\.getElementById\('searchbox'\)[^<]*</script>|\sstyle=\"[^\"]*\"")
+_INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
+_STYLES = (
+    ('style="display: none;"', 'class="visually-hidden"'),
+    ('style="opacity: 50%"', 'opacity="0.5"'),
+)
+_STYLED = re.compile(r"\sstyle=\"[^\"]*\"")
 _FORBIDDEN = re.compile(
     r"<script>|<style|\sstyle=|@import|url\([\"']?(https?:)?//|"
     r"(src|href)=[\"']?(https?:)?//[^\"'>]*\.(js|css|woff2?|ttf|svg|png)"
@@ -79,7 +84,7 @@ def _assemble(folder: Path) -> None:
     """Write the pages that Sphinx reads, all in one folder."""
     docs = _ROOT / "docs"
     pages = {path.stem: path.read_text(encoding="utf-8") for path in docs.glob("*.md")}
-    for name in ("README", "GLOSSARY", *_PAGES["Project"].split()):
+    for name in ("README", "GLOSSARY", "CHANGELOG", "CONTRIBUTING", "ARCHITECTURE", "SECURITY"):
         pages[name] = (_ROOT / f"{name}.md").read_text(encoding="utf-8")
     pages["index"] = pages.pop("README") + "\n" + "\n".join(_tree())
     pages["commands"], pages["python"] = "\n".join(_commands()), "\n".join(_python())
@@ -102,6 +107,14 @@ def _assemble(folder: Path) -> None:
     shutil.copy(_ROOT / "static" / "icon.svg", folder / "icon.svg")
 
 
+def _moved(out: Path, inline: re.Match[str]) -> str:
+    """Write a script or a style of a page to a file of its own, since the page's policy allows none within, and refer to it."""
+    kind, text = inline.groups()
+    name = f"_static/{hashlib.sha256(text.encode()).hexdigest()[:12]}.{'js' if kind == 'script' else 'css'}"
+    (out / name).write_text(text, encoding="utf-8")
+    return f'<script src="{name}"></script>' if kind == "script" else f'<link rel="stylesheet" href="{name}">'
+
+
 def main() -> int:
     """Build the site; return the exit code."""
     from sphinx.application import Sphinx
@@ -112,21 +125,19 @@ def main() -> int:
     settings = {
         "project": "cocalib",
         "html_title": "cocalib",
-        "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
-        "html_theme": "alabaster",
+        "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "mathml"],
+        "html_theme": "furo",
+        "html_math_renderer": "mathml",
+        "html_show_copyright": False,
         "html_favicon": "icon.svg",
         "html_copy_source": False,
         "html_use_index": False,
         "html_show_sourcelink": False,
         "html_show_sphinx": False,
-        "html_theme_options": {
-            "page_width": "1200px",
-            "sidebar_width": "250px",
-            "fixed_sidebar": True,
-            "font_family": _FONT,
-            "head_font_family": _FONT,
-        },
         "myst_heading_anchors": 4,
+        "myst_enable_extensions": ["dollarmath"],
+        "myst_dmath_allow_space": False,
+        "copybutton_exclude": ".go, .gp",
         "autodoc_typehints": "none",
         "napoleon_numpy_docstring": False,
         "highlight_language": "text",
@@ -137,8 +148,11 @@ def main() -> int:
         shutil.rmtree(out, ignore_errors=True)
         app = Sphinx(folder, None, out, Path(folder) / ".doctrees", "html", settings, warningiserror=True, status=None)
         app.build()
-    for page in out.glob("*.html"):  # the page's policy allows no script or style within a page
-        page.write_text(_INLINE.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
+    for page in out.glob("*.html"):
+        text = _INLINE.sub(partial(_moved, out), page.read_text(encoding="utf-8"))
+        for style, attribute in _STYLES:
+            text = text.replace(style, attribute)
+        page.write_text(_STYLED.sub("", text), encoding="utf-8")
     files = [path for path in out.rglob("*") if path.is_file()]
     size_mb = sum(path.stat().st_size for path in files) / 1e6
     forbidden = [

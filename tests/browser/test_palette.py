@@ -12,6 +12,13 @@ from tests.browser.driving import Driver
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
+_CUT_OFF = """[...document.querySelectorAll("article *, article")].filter((part) => {
+  const box = part.getBoundingClientRect();
+  const scrolled = part.closest(".table-wrapper, pre, .highlight");
+  return box.width && !scrolled && !part.closest(".visually-hidden") && (box.right > innerWidth + 1 || box.left < -1);
+}).map((part) => `${part.tagName} ${part.textContent.slice(0, 40)}`)"""
+
+
 def found(page: Driver, query: str) -> list[str]:
     """Type into the palette and return the names of the rows, the first ones."""
     page.page.fill("#palette input", query)
@@ -116,10 +123,13 @@ def test_the_help_leads_to_the_documentation_and_its_search(page: Driver) -> Non
         "console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None
     )
     docs.on("pageerror", lambda error: complaints.append(str(error)))
-    for name in ("", "tour.html", "commands.html", "paper-experiments.html"):
+    for name in ("", "tour.html", "commands.html", "method.html", "drift.html"):
         docs.goto(f"{page.page.url.split('?')[0]}docs/{name}")
         expect(docs.locator("h1").first).to_be_visible()
         assert docs.evaluate("[...document.images].every((image) => image.naturalWidth)")
+        for width, height in ((1440, 900), (390, 844)):
+            docs.set_viewport_size({"width": width, "height": height})
+            assert docs.evaluate(_CUT_OFF) == [], (name, width)
     docs.locator("input[name=q]").first.fill("drift")
     docs.keyboard.press("Enter")
     expect(docs.locator("#search-results a", has_text="Drift").first).to_be_visible()
