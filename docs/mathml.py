@@ -16,9 +16,8 @@ def _inline(writer: Any, node: nodes.math) -> None:
 
 
 def _block(writer: Any, node: nodes.math_block) -> None:
-    text = node.astext()
-    number = "".join(f'<span class="eqno" id="equation-{one}">({one})</span>' for one in _NUMBER.findall(text))
-    writer.body.append(f'<div class="math table-wrapper">{number}{tex2mathml(_NUMBER.sub("", text), as_block=True)}</div>')
+    equation = tex2mathml(_NUMBER.sub(r"\\qquad (\1)", node.astext()), as_block=True)
+    writer.body.append(f'<div class="math table-wrapper">{equation}</div>')
     raise nodes.SkipNode
 
 
