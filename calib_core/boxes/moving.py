@@ -33,6 +33,8 @@ _SHADOW_TINT = 0.12
 """Of the factor by which a shadow darkens the channels: the sky still lights it, bluer than the sun."""
 _MOST_CHANGED = 0.4
 _MOST_CHANGED_FRAMES = 0.5
+_TURNED_SHARE = 0.1
+"""By how much more of the image changes for good when the camera turns by a degree; traffic covers less, and passes."""
 _JOIN_PX = 5
 _STEP_NS = 200_000_000
 _STRETCH_FRAMES = 30
@@ -81,9 +83,12 @@ def changed_boxes(
         )
     small = [reduced(image) for _, image in images]
     size = (images[0][1].shape[1], images[0][1].shape[0])
+    turned = _turned_at(small)
+    turned_index = images[turned][0] if turned else len(image_times)
     del images
-    background = background_of(small)
-    _refuse_moving_camera([_changed_pixels(image, background) for image in small], background, source)
+    backgrounds = [background_of(part) for part in (small[:turned], small[turned:]) if part]
+    for part, background in zip((small[:turned], small[turned:]) if turned else (small,), backgrounds, strict=True):
+        _refuse_moving_camera([_changed_pixels(image, background) for image in part], background, source)
     found: list[tuple[TimeNs, list[Box]]] = []
     stretches = _stretches(image_times, most_frames)
     total = sum(map(len, stretches))
@@ -92,6 +97,7 @@ def changed_boxes(
     for stretch in stretches:
         found = []
         for index, image in _readable(read_image, stretch):
+            background = backgrounds[-1 if index >= turned_index else 0]
             found.append((TimeNs(int(image_times[index])), _regions(_changed_pixels(reduced(image), background), size)))
             if progress:
                 progress(len(named) + len(found), total)
@@ -100,8 +106,12 @@ def changed_boxes(
         named.extend(FrameBoxes(time, boxes) for (time, _), boxes in zip(found, tracks, strict=True))
     if not any(frame.boxes for frame in named):
         raise NoAnswerError(f"{source}: nothing moves in {len(named)} frames looked at; give a file or topic of boxes")
-    note = f"boxes are around whatever changes in the image; {len(named)} of {len(image_times)} frames were looked at"
-    return Boxes(tuple(named), source, size, (note,))
+    notes = [
+        f"boxes are around whatever changes in the image; {len(named)} of {len(image_times)} frames were looked at"
+    ]
+    if turned:
+        notes.append(f"the camera turned before frame {turned_index}: each side of it has a background of its own")
+    return Boxes(tuple(named), source, size, tuple(notes))
 
 
 def _readable(read_image: Callable[[int], np.ndarray], indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -156,6 +166,22 @@ def background_of(images: Sequence[np.ndarray]) -> Background:
     median = np.median(stack, axis=0).astype(np.float32)
     deviation = np.median(np.abs(stack - median), axis=0).astype(np.float32)
     return Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
+
+
+def _turned_at(images: Sequence[np.ndarray]) -> int:
+    """Return the number of the first image after the camera turned for good; 0 if it did not.
+
+    Images that differ from the first ones in much more of the scene than those between do are of a camera that turned.
+    """
+    if len(images) < 2 * _FEWEST_FRAMES:
+        return 0
+    first = background_of(images[:_FEWEST_FRAMES])
+    shares = np.array([_changed_pixels(image, first).mean() for image in images])
+    splits = range(_FEWEST_FRAMES, len(images) - _FEWEST_FRAMES + 1)
+    steps = [float(np.median(shares[k:]) - np.median(shares[:k])) for k in splits]
+    weights = [k * (len(images) - k) * (shares[k:].mean() - shares[:k].mean()) ** 2 for k in splits]
+    best = int(np.argmax(weights))
+    return splits[best] if steps[best] > _TURNED_SHARE else 0
 
 
 def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:

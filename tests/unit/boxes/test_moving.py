@@ -112,3 +112,20 @@ def test_images_in_which_nothing_moves_are_refused():
 
     with pytest.raises(InputError, match="nothing moves in 10 frames"):
         changed_boxes(lambda _: still, times(10))
+
+
+@pytest.mark.parametrize("turned_from", [20, 30])
+def test_a_camera_that_turns_once_gets_a_background_on_each_side(turned_from):
+    count = 50
+
+    def image(index: int) -> np.ndarray:
+        return np.roll(scene_image(index, count), 5 if index >= turned_from else 0, axis=1)
+
+    boxes = changed_boxes(image, times(count))
+
+    per_frame = np.array([len(frame.boxes) for frame in boxes])
+    assert np.median(per_frame) == 1
+    assert (per_frame == 1).mean() > 0.9
+    assert len(boxes.notes) == 2
+    (box,) = boxes.frames[45].boxes
+    assert box.left_px == pytest.approx(walker(45, count)[0] + 4.5, abs=3.0)
