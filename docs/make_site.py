@@ -23,7 +23,7 @@ _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
 _PAGES = {
     "Get started": "tour first-steps examples gallery",
-    "How to": "radar-formats intrinsics proposals evaluation boxes drift watch fleet report rerun simulation",
+    "How to": "radar-formats intrinsics proposals evaluation boxes drift watch fleet report citing rerun simulation",
     "Concepts": "method conventions apex paper reliability security GLOSSARY",
     "Reference": "commands python formats warnings",
     "Project": "accuracy paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",

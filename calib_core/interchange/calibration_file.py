@@ -283,6 +283,15 @@ class CalibrationFile:
         """What the pose rests on: as stated; else it was clicked if it has solved pairs, and assumed if it has none."""
         return self.evidence or ("clicked" if self.calibration.pairs else "imported_assumed")
 
+    def __str__(self) -> str:
+        made_from = ", ".join(part.name for part in self.provenance.inputs)
+        own = [
+            f"  frames          camera {self.frames.camera!r} from radar {self.frames.radar!r}",
+            f"  rests on        {self.rests_on}{f', {made_from}' if made_from else ''}",
+            *([f"  written by      cocalib {self.provenance.version}"] if self.provenance.version else []),
+        ]
+        return "\n".join((str(self.calibration), *own))
+
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:
     """Choose the inlier's true position, rounded to a millimetre, that projects nearest to the image centre.

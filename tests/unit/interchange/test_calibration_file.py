@@ -107,6 +107,14 @@ def test_a_paper_calibration_with_outliers_passes_its_check():
     assert "that are used average" in wrong.message
 
 
+def test_printed_a_file_shows_pose_figures_frames_and_where_it_comes_from(golden_text):
+    file = read_calibration(golden_text)
+    text = str(file)
+    assert text.startswith(str(file.calibration))
+    for fact in (file.frames.radar, file.frames.camera, file.rests_on, file.provenance.version):
+        assert fact in text
+
+
 def test_a_file_without_a_verdict_stays_without_one(golden_text):
     text = json.dumps({key: value for key, value in json.loads(golden_text).items() if key != "verdict"})
     assert read_calibration(text).verdict is None
