@@ -498,7 +498,7 @@ export interface SpaceReflector {
 export interface SpacePlacement {
   position_m: [number, number, number];
   pixel_px: [number, number] | null;
-  state: "open" | "clicked" | "dismissed";
+  state: "open" | "marked" | "guess" | "dismissed" | "unlikely";
 }
 
 /** Words at a point. */

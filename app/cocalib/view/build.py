@@ -1,7 +1,7 @@
 """Build the View of a session, in one pure call; and the same figures of a calibration as lines of text."""
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,10 +22,8 @@ from calib_core.results.actions import (
 from calib_core.results.verdict import (
     SURE_PAIRS,
     Verdict,
-    VerdictLevel,
     by_consequence,
     consequence_of,
-    stated_error,
     verdict_on,
 )
 from calib_core.words.outcomes import by_cause, in_sentences
@@ -251,23 +249,34 @@ def verdict_row(verdict: Verdict, session: Session, left: int | None) -> Verdict
         session: with that outcome.
         left: how many placements want a click; None if no placement is known.
     """
-    seen = _Pairs.of(verdict, session, left)
+    outcome = session.outcome if session.clicks else None
+    used = [pair for pair in outcome.pairs if not pair.excluded] if isinstance(outcome, Calibration) else []
+    misfits = [pair for pair in used if not pair.inlier and pair.rival < 0 and disagreement(session.options).of_pair]
+    doubt = max((pair for pair in used if pair.inlier), key=lambda pair: pair.outlier_probability, default=None)
+    suspect = named(doubt.id) if doubt is not None and doubt.outlier_probability > _SUSPECT else Words()
+    do_not_fit = say(
+        "{ids} {do} not fit", ids=listed([pair.id for pair in misfits]), do="do" if misfits[1:] else "does"
+    )
+    seen = _Seen(
+        verdict, outcome, tuple(used), do_not_fit if misfits else Words(), suspect, left != 0, bool(session.clicks)
+    )
     rule = next((rule for rule in _RULES if rule.holds(seen)), _AS_STATED)
-    action = ReviewPairs((seen.suspect,)) if rule.asks else action_of(verdict)
-    asked = say("Is the mark of {pair} on the inner corner?", pair=named(seen.suspect)) if rule.asks else Words()
+    asks = rule.kind == "asks" and doubt is not None
+    action = ReviewPairs((doubt.id,)) if asks else action_of(verdict)
+    asked = say("Is the mark of {pair} on the inner corner?", pair=suspect) if asks else Words()
     return VerdictRow(
-        level=rule.level or verdict.level,
+        level="coarse" if rule.kind in ("asks", "wrong") else verdict.level,
         word="" if rule.line else verdict.level,
         line=rule.line(seen) if rule.line else verdict_rest(verdict).with_degree_signs(),
         action=asked or sentence(action_words(verdict)),
         assumes=sentence("assumes " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
         kind=type(action).__name__,
         pairs=action.ids if isinstance(action, ReviewPairs | ChooseReturn) else (),
-        key="" if rule.asks else "N" if rule.line and left else _key(verdict, left),
+        key="" if asks else "N" if rule.line and left else _key(verdict, left),
         option=_option(action, session),
         done=verdict.done,
-        early=rule.calm,
-        misfits=say("{pairs} fit.", pairs=_do_not(seen.misfits)) if seen.misfits else Words(),
+        early=rule.kind == "calm",
+        misfits=seen.misfits + "." if misfits else Words(),
     )
 
 
@@ -277,64 +286,32 @@ _SUSPECT = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class _Pairs:
+class _Seen:
     """What the rules of the verdict's line ask.
 
     Attributes:
-        verdict: on the latest outcome.
+        verdict: on the outcome.
         outcome: the latest one; None before any click.
-        clicks: how many there are.
-        left: how many placements have no click; None if that is not known.
         used: the pairs that are not excluded.
-        misfits: ids of those that are set aside because they do not fit the others.
-        suspect: id of the one that may be an outlier although the few others cannot tell; "" if there is none.
+        misfits: which are set aside because they do not fit the others; empty if there are none.
+        suspect: the one that may be an outlier although the few others cannot tell; empty if there is none.
+        more: placements are left, or none is known.
+        clicked: there is a click.
     """
 
     verdict: Verdict
     outcome: Outcome | None
-    clicks: int
-    left: int | None
-    used: tuple[PairResult, ...] = ()
-    misfits: tuple[str, ...] = ()
-    suspect: str = ""
-
-    @classmethod
-    def of(cls, verdict: Verdict, session: Session, left: int | None) -> "_Pairs":
-        """Collect it from a session."""
-        outcome, clicks = session.outcome if session.clicks else None, len(session.clicks)
-        if not isinstance(outcome, Calibration):
-            return cls(verdict, outcome, clicks, left)
-        used = tuple(pair for pair in outcome.pairs if not pair.excluded)
-        aside = [pair.id for pair in used if not pair.inlier and pair.rival < 0]
-        doubt = max(((pair.outlier_probability, pair.id) for pair in used if pair.inlier), default=(0.0, ""))
-        return cls(
-            verdict,
-            outcome,
-            clicks,
-            left,
-            used,
-            tuple(aside) if disagreement(outcome.options).of_pair else (),
-            doubt[1] if doubt[0] > _SUSPECT else "",
-        )
-
-    @property
-    def waits(self) -> bool:
-        """Whether nothing but more pairs is missing for a first pose."""
-        outcome = self.outcome
-        return isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs" and not outcome.unpaired
-
-    @property
-    def one_wrong(self) -> bool:
-        """Whether all pairs but one agree, and too few to tell which one is wrong."""
-        outcome = self.outcome
-        return isinstance(outcome, Unsolvable) and outcome.facts == {"agreeing": MIN_PAIRS - 1, "pairs": MIN_PAIRS}
+    used: tuple[PairResult, ...]
+    misfits: Words
+    suspect: Words
+    more: bool
+    clicked: bool
 
     @property
     def few(self) -> bool:
         """Whether there is a pose of fewer pairs than a verdict needs, and nothing is wrong that more would not settle."""
-        if not isinstance(self.outcome, Calibration) or not self.outcome.options.models_noise:
-            return False
-        return self.agreeing < SURE_PAIRS and self._has(only=_MORE_PAIRS_DECIDE)
+        solved = self.outcome if isinstance(self.outcome, Calibration) and self.outcome.options.models_noise else None
+        return solved is not None and self.agreeing < SURE_PAIRS and _grave(solved) <= {*_MORE_PAIRS_DECIDE}
 
     @property
     def agreeing(self) -> int:
@@ -342,49 +319,47 @@ class _Pairs:
         return sum(pair.inlier for pair in self.used)
 
     @property
-    def agree(self) -> bool:
+    def all_agree(self) -> bool:
         """Whether all pairs fit."""
         return self.agreeing == len(self.used)
 
-    @property
-    def large(self) -> bool:
-        """Whether only the size of the error is wrong, all pairs agree, and placements are left."""
-        return self.verdict.is_only_large and self.left != 0 and self.agree
 
-    @property
-    def open_return(self) -> bool:
-        """Whether a pair is set aside because nobody has chosen its return."""
-        return any(not pair.inlier and pair.rival >= 0 for pair in self.used)
-
-    @property
-    def two_poses(self) -> bool:
-        """Whether a second pose fits, as it does for few pairs: that contradicts nothing until they are enough."""
-        return not self._has(only=tuple(code for code in _MORE_PAIRS_DECIDE if code != "two-poses"))
-
-    def _has(self, only: tuple[str, ...]) -> bool:
-        """Whether all grave warnings are among these codes."""
-        warnings = self.outcome.warnings if isinstance(self.outcome, Calibration) else ()
-        grave = (one.code for one in warnings if consequence_of(one.code) not in ("limited", "note"))
-        return all(code in only for code in grave)
-
-    def counted(self, what: Words | str) -> Words:
-        """Return how many pairs there are of those that a verdict needs, and what is to be said of them."""
-        return say("{count} of {needed} pairs; {what}", count=self.agreeing, needed=SURE_PAIRS, what=what)
-
-    def within(self, what: Words | str) -> Words:
-        """Return how many pairs there are, what is to be said of them, and how large the error still is."""
-        assert isinstance(self.outcome, Calibration)  # of a rule that holds for a large error
-        within = error_text(stated_error(self.outcome))
-        return say("{count} pairs{what}; so far within {within}", count=len(self.used), what=what, within=within)
-
-    @property
-    def check(self) -> Words:
-        """The suspect, to be checked."""
-        return say("check {pair}", pair=named(self.suspect))
+def _grave(outcome: Outcome | None) -> set[str]:
+    """Return the codes of the warnings that make a verdict coarse or contradictory."""
+    warnings = outcome.warnings if isinstance(outcome, Calibration) else ()
+    return {one.code for one in warnings if consequence_of(one.code) not in ("limited", "note")}
 
 
-def _do_not(ids: tuple[str, ...]) -> Words:
-    return say("{ids} {do} not", ids=listed(ids), do="does" if len(ids) == 1 else "do")
+def _only_large(now: _Seen) -> bool:
+    """Return whether only the size of the error is wrong, all pairs agree, and placements are left."""
+    return now.verdict.is_only_large and now.more and now.all_agree
+
+
+def _is(now: _Seen, code: str, **facts: int) -> bool:
+    """Return whether there is no pose, for a reason with these facts, other than clicks without a return."""
+    outcome = now.outcome
+    return (
+        isinstance(outcome, Unsolvable)
+        and outcome.code == code
+        and not outcome.unpaired
+        and facts.items() <= outcome.facts.items()
+    )
+
+
+def _counted(now: _Seen, what: Words | str) -> Words:
+    """Return how many pairs there are of those that a verdict needs, and what is to be said of them."""
+    return f"{now.agreeing} of {SURE_PAIRS} pairs; " + words(what)
+
+
+def _within(now: _Seen, what: Words | str) -> Words:
+    """Return how many pairs there are, what is to be said of them, and how large the error still is."""
+    error = now.verdict.error
+    return say(
+        "{count} pairs{what}; so far within {error}",
+        count=len(now.used),
+        what=what,
+        error=error_text(error) if error else "",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,52 +369,48 @@ class _Rule:
     Attributes:
         holds: when it is said.
         line: what is said; None says the verdict as it is stated.
-        calm: nothing is wrong.
-        asks: whether the suspect's mark is on the inner corner.
-        level: instead of the verdict's; "" keeps that.
+        kind: whether nothing is wrong; the suspect's mark is asked about; a pair is wrong.
     """
 
-    holds: Callable[[_Pairs], bool]
-    line: Callable[[_Pairs], Words] | None
-    _: KW_ONLY
-    calm: bool = False
-    asks: bool = False
-    level: VerdictLevel | Literal[""] = ""
+    holds: Callable[[_Seen], object]
+    line: Callable[[_Seen], Words] | None
+    kind: Literal["stated", "calm", "asks", "wrong"] = "stated"
 
 
 _AS_STATED = _Rule(lambda _: True, None)
 _RULES = (
     _Rule(lambda now: now.verdict.level in ("good", "usable"), None),
-    _Rule(lambda now: not now.clicks, lambda _: words("No clicks yet"), calm=True),
-    _Rule(lambda now: now.outcome is None, lambda _: words("No answer yet"), calm=True),
-    _Rule(lambda now: now.waits, lambda now: words(f"{_made(now)} of {SURE_PAIRS} pairs"), calm=True),
-    _Rule(lambda now: now.one_wrong, lambda _: words(f"One of the {MIN_PAIRS} does not fit"), level="coarse"),
+    _Rule(lambda now: not now.clicked, lambda _: words("No clicks yet"), "calm"),
+    _Rule(lambda now: now.outcome is None, lambda _: words("No answer yet"), "calm"),
     _Rule(
-        lambda now: now.few and bool(now.misfits),
-        lambda now: now.counted(say("{ids} fit", ids=_do_not(now.misfits))),
-        level="coarse",
-    ),
-    _Rule(lambda now: now.few and now.open_return, lambda now: now.counted("a return is open"), level="coarse"),
-    _Rule(
-        lambda now: now.few and now.agree and bool(now.suspect),
-        lambda now: now.counted(now.check),
-        asks=True,
-        level="coarse",
+        lambda now: _is(now, "too-few-pairs"),
+        lambda now: words(f"{len(now.outcome.pairs) if now.outcome else 0} of {SURE_PAIRS} pairs"),
+        "calm",
     ),
     _Rule(
-        lambda now: now.few and now.agree and now.two_poses,
-        lambda now: now.counted("two answers fit so far"),
-        calm=True,
+        lambda now: _is(now, "no-pose", agreeing=MIN_PAIRS - 1, pairs=MIN_PAIRS),
+        lambda _: words(f"One of the {MIN_PAIRS} does not fit"),
+        "wrong",
     ),
-    _Rule(lambda now: now.few and now.agree, lambda now: now.counted("looks consistent"), calm=True),
-    _Rule(lambda now: now.large and bool(now.suspect), lambda now: now.within("; " + now.check), asks=True),
-    _Rule(lambda now: now.large, lambda now: now.within(" agree"), calm=True),
+    _Rule(lambda now: now.few and now.misfits, lambda now: _counted(now, now.misfits), "wrong"),
+    _Rule(
+        lambda now: now.few and any(pair.rival >= 0 and not pair.inlier for pair in now.used),
+        lambda now: _counted(now, "a return is open"),
+        "wrong",
+    ),
+    _Rule(
+        lambda now: now.few and now.all_agree and now.suspect, lambda now: _counted(now, "check " + now.suspect), "asks"
+    ),
+    _Rule(
+        lambda now: now.few and now.all_agree and "two-poses" in _grave(now.outcome),
+        lambda now: _counted(now, "two answers fit so far"),
+        "calm",
+    ),
+    _Rule(lambda now: now.few and now.all_agree, lambda now: _counted(now, "looks consistent"), "calm"),
+    _Rule(lambda now: _only_large(now) and now.suspect, lambda now: _within(now, "; check " + now.suspect), "asks"),
+    _Rule(_only_large, lambda now: _within(now, " agree"), "calm"),
 )
 """What is said while pairs are few, or many are left: the first that holds. From enough pairs on, the verdict as it is stated."""
-
-
-def _made(now: _Pairs) -> int:
-    return len(now.outcome.pairs) if now.outcome is not None else 0
 
 
 def _key(verdict: Verdict, left: int | None) -> Literal["", "N", "E"]:

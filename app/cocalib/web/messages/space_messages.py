@@ -1,13 +1,11 @@
 """What is sent to a page of the 3D view, of the placements, and of the radar seen from above where there is no camera."""
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import msgspec
 
-from cocalib.view.model import Figure
-
-PlacementState: TypeAlias = Literal["open", "clicked", "dismissed"]
+from cocalib.view.model import Figure, PlacementState
 
 
 class RadarReturn(msgspec.Struct, frozen=True, array_like=True):
@@ -78,7 +76,7 @@ class SpacePlacement:
     Attributes:
         position_m: (x, y, z) where it is drawn.
         pixel_px: (u, v) in the image; None if it is not in it, or without a calibration.
-        state: whether it has a click, or was dismissed.
+        state: what became of it.
     """
 
     position_m: tuple[float, float, float]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import viser
 from typing import TYPE_CHECKING
 
-from cocalib.web.messages.space_messages import PlacementState
+from cocalib.view.model import PlacementState
 from cocalib.web.view3d.returns import map_colours
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ class SurveyNodes:
         self._map = add_cloud(scene, "/map", 0.1)
         self._rings = {
             state: add_lines(scene, f"/placements_{state}", width_px, DARK.next)
-            for state, width_px in (("open", 2.0), ("clicked", 1.0))
+            for state, width_px in (("open", 2.0), ("marked", 1.0))
         }
         self._mapped: object = None
         self._placed: object = None
@@ -285,7 +285,7 @@ class SurveyNodes:
         self._placed = placed
         positions = np.array([placement.position_radar_m for placement in sight.placements]).reshape(-1, 3)
         places = sight.errors.corrected(positions)
-        colours: dict[PlacementState, tuple[int, int, int]] = {"open": palette.next, "clicked": palette.rings}
+        colours: dict[PlacementState, tuple[int, int, int]] = {"open": palette.next, "marked": palette.rings}
         for state, rings in self._rings.items():
             chosen = np.array([one == state for one in states], dtype=bool)
             rings.colors = np.array(colours[state], dtype=np.uint8)  # type: ignore[index]

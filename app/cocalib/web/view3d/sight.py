@@ -5,17 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values, Vector3
+from calib_core.arrays import Points3, Values
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, PairResult
 from cocalib.session.state import Session
-from cocalib.view.model import View
+from cocalib.view.model import PlacementState, View
+from cocalib.view.placement_states import SeenPlacements, placement_states, placements_of_clicks
 from cocalib.view.reference import Reference, shown_calibration
 from cocalib.web.frames import Frame
 from cocalib.web.messages.space_messages import (
-    PlacementState,
     RadarMap,
     SpaceFrame,
     SpaceLabel,
@@ -26,9 +26,6 @@ from cocalib.web.messages.space_messages import (
 from cocalib.web.radar_sight import Returns, pixels_of
 from cocalib.web.view3d.extent import ring_ranges_m
 from cocalib.web.view3d.returns import SIZES, Colouring, size_classes
-
-_SAME_PLACE_M = 1.0
-"""Of two placements at one time, a pair belongs to the one this close to its return."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,25 +77,9 @@ class Sight:
         return self.calibration.radar_errors if self.calibration else RadarErrors()
 
     def placement_states(self) -> tuple[PlacementState, ...]:
-        """Say of each placement whether it has a click, or was dismissed."""
-        outcome = self.session.outcome
-        pairs = outcome.pairs if isinstance(outcome, Calibration) else ()
-        points = {pair.id: pair.point_radar_m for pair in pairs}
-        clicks = [(int(click.image_time), points.get(click.id)) for click in self.session.clicks]
-        dismissed = [(int(one.time), np.array(one.position_m)) for one in self.session.dismissed]
-        return tuple(
-            "dismissed" if _is_any(dismissed, placement) else "clicked" if _is_any(clicks, placement) else "open"
-            for placement in self.placements
-        )
-
-
-def _is_any(seen: Sequence[tuple[int, Vector3 | None]], placement: Placement) -> bool:
-    """Return whether any of some moments lies in a placement, and its position, if known, at the placement's."""
-    return any(
-        placement.start <= time <= placement.end
-        and (point is None or np.linalg.norm(point - placement.position_radar_m) < _SAME_PLACE_M)
-        for time, point in seen
-    )
+        """Say what became of each placement."""
+        of_clicks = placements_of_clicks(self.session, self.placements)
+        return placement_states(self.session, SeenPlacements(tuple(self.placements)), of_clicks)
 
 
 def true_positions(calibration: Calibration, pairs: Sequence[PairResult]) -> Points3:

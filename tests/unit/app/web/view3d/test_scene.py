@@ -241,7 +241,7 @@ def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_move
     assert drawn.camera.position == moved
 
 
-def test_a_placement_is_open_clicked_or_dismissed():
+def test_a_placement_is_open_marked_or_dismissed():
     apart = [(5.0, 1.0, -0.5), (5.0, -4.0, 0.0), (8.0, -2.0, 0.3), (9.0, 0.0, 0.0)]
     spans = [(0, 500), (0, 500), (1000, 1500), (9000, 9500)]
     placements = tuple(
@@ -249,12 +249,10 @@ def test_a_placement_is_open_clicked_or_dismissed():
         for (start, end), place in zip(spans, apart, strict=True)
     )
     seen = replace(sight(calibration()), placements=placements)
-    assert seen.placement_states() == ("clicked", "open", "clicked", "open"), (
-        "two at once: the pair's is the clicked one"
-    )
+    assert seen.placement_states() == ("marked", "open", "marked", "open"), "two at once: the pair's is the marked one"
     dismissed = replace(seen.session, dismissed=(DismissedPlacement(TimeNs(9100), (9.0, 0.0, 0.0)),))
     states = replace(seen, session=dismissed).placement_states()
-    assert states == ("clicked", "open", "clicked", "dismissed")
+    assert states == ("marked", "open", "marked", "dismissed")
     assert [one.state for one in space_frame(seen).placements] == list(seen.placement_states())
 
 
