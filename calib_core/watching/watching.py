@@ -36,6 +36,8 @@ _AT_ONCE = 2.0
 _AVERAGED = 4
 """Stretches of image and still returns that a turn is averaged over."""
 _BACKGROUNDS = 4
+_BASELINE_RAD = np.deg2rad(0.1)
+"""A camera that turns by more within a baseline gives none."""
 _BASELINE_STRETCHES = 20
 
 
@@ -193,12 +195,19 @@ def baseline_of(found: Sequence[Stretch], *, calibration_sha256: str, recording:
     """Make a baseline of the stretches of a recording.
 
     Raises:
-        NoAnswerError: they show nothing to compare with.
+        NoAnswerError: they show nothing to compare with, or a camera that turns.
     """
     rows = [one.rows for one in found if one.rows is not None and len(one.rows)]
     images = [one.image for one in found if one.image is not None]
     parts = np.array_split(np.arange(len(images)), min(_BACKGROUNDS, len(images))) if images else []
     backgrounds = [np.median([images[i] for i in part], axis=0).astype(np.uint8) for part in parts]
+    turn = camera_turn(backgrounds[0], backgrounds[-1], camera) if len(backgrounds) > 1 else None
+    if turn is not None and float(np.linalg.norm(turn.rotation_rad)) > _BASELINE_RAD:
+        turned_deg = np.rad2deg(np.linalg.norm(turn.rotation_rad))
+        raise NoAnswerError(
+            f"{recording}: the camera turned by {turned_deg:.2f}° within it, so nothing can be compared with it; give a "
+            "recording in which it stands still"
+        )
     still = [one.scans for one in found if one.still and len(one.scans)][:_BASELINE_STRETCHES]
     places = still_places(RadarScans.joined(still)) if still else None
     if not backgrounds and not rows and not places:

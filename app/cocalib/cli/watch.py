@@ -60,8 +60,10 @@ class Watch:
 
         if not self.recording:
             raise InputError("RECORDING is missing; see cocalib watch --help")
-        digest = hashlib.sha256(self.calibration.read_bytes()).hexdigest() if self.calibration.is_file() else ""
         imported = self.frames.read([self.calibration])[0]
+        if not self.calibration.is_file():
+            raise InputError(f"{self.calibration}: is a folder; convert it to one file with cocalib import")
+        digest = hashlib.sha256(self.calibration.read_bytes()).hexdigest()
         path = self.baseline or self.calibration.with_name(f"{self.calibration.stem}.baseline.json")
         baseline = self._read_baseline(path, digest) if path.exists() else None
         if baseline is None and self.update is not None:

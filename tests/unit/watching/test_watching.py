@@ -97,6 +97,12 @@ def test_a_recording_without_anything_gives_no_baseline():
         baseline_of([nothing], calibration_sha256="a" * 64, recording="r", camera=SMALL)
 
 
+def test_a_camera_that_turns_within_it_gives_no_baseline():
+    found = [stretch(number, camera_deg=(0.0, 0.3 * (number > 1), 0.0)) for number in range(4)]
+    with pytest.raises(NoAnswerError, match=r"0\.30"):
+        baseline_of(found, calibration_sha256="a" * 64, recording="r", camera=SMALL)
+
+
 class _Street:
     """A street's radar and boxes, with grey images, as a recording."""
 
