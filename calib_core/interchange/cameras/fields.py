@@ -89,11 +89,14 @@ def _flat_camera(
     model = str(content.get("distortion_model") or content.get("model") or "")
     if str(content.get("fisheye_model", "0")).lower() in ("1", "true"):
         model = "fisheye"
+    coefficients = floats(distortion, source=source, place=distortion_keys[0])
     return FoundCamera(
         name=matrix_key,
-        model=lens_model_named(model, source=source),
+        model=lens_model_named(
+            "none" if model.lower() == "rectified" and not any(coefficients) else model, source=source
+        ),
         matrix_px=_matrix(content[matrix_key], source=source, place=matrix_key),
-        distortion=floats(distortion, source=source, place=distortion_keys[0]),
+        distortion=coefficients,
         size_px=_size(content, source=source),
         covariance=_covariance(content, source=source),
         window=_window(content, source=source),
@@ -183,17 +186,18 @@ def _covariance(content: Mapping[str, Any], *, source: str) -> CameraCovariance 
 
 
 def lens_model_named(name: str, *, source: str) -> str:
-    """Return our name for a lens model as a file names it; "" if the file does not.
+    """Return our name for a lens model as a file names it, such as plumb_bob, "Plumb Bob" or plumb'bob; "" if it does not.
 
     Raises:
         InputError: it is not supported.
     """
-    if not name:
-        return ""
-    models = {known: lens.name for lens in LENS_MODELS.values() for known in lens.names_in_files}
-    if name.lower() not in models:
-        raise InputError(f"{source}: the lens model {name!r} is not supported; known: {', '.join(models)}")
-    return models[name.lower()]
+    models = {"": "", **{known: lens.name for lens in LENS_MODELS.values() for known in lens.names_in_files}}
+    spelt = re.sub(r"[\W_]+", "_", name.strip().lower())
+    if spelt not in models:
+        raise InputError(
+            f"{source}: the lens model {name!r} is not supported; known: {', '.join(filter(None, models))}"
+        )
+    return models[spelt]
 
 
 def _size(content: Mapping[str, Any], *, source: str) -> tuple[int, int] | None:
@@ -206,7 +210,10 @@ def _size(content: Mapping[str, Any], *, source: str) -> tuple[int, int] | None:
 
 
 def _matrix(value: Any, *, source: str, place: str) -> tuple[float, ...]:
-    return floats(value, source=source, place=place, length=9)
+    numbers = floats(value, source=source, place=place)
+    if len(numbers) == 12:  # a projection K [I | 0]
+        numbers = (*numbers[0:3], *numbers[4:7], *numbers[8:11])
+    return floats(numbers, source=source, place=place, length=9)
 
 
 _LARGEST = 1e9

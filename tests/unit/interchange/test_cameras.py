@@ -126,6 +126,11 @@ def test_kalibr_s_camera_is_read_or_the_named_one_of_several():
         ("plumb_bob", [0.1] * 5 + [0.0] * 3, "plumb_bob"),
         ("fisheye", [0.1] * 4, "equidistant"),
         ("equidistant", [0.1] * 4 + [0.0], "equidistant"),
+        ("Plumb Bob", [0.1] * 5, "plumb_bob"),
+        ("plumb'bob", [0.1] * 5, "plumb_bob"),
+        ("Brown Conrady", [0.1] * 5, "plumb_bob"),
+        ("rectified", [], "pinhole"),
+        ("rectified", [0.0] * 5, "pinhole"),
     ],
 )
 def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coefficients, read_as):
@@ -178,6 +183,13 @@ def test_a_missing_image_size_is_taken_from_the_recording():
         InputError, match=r"principal point \(\d+, \d+\) is that of images of about 6\d\d x \d+ px, but these"
     ):
         read_camera(text, image_size_px=(960, 720))
+
+
+def test_a_projection_of_three_rows_of_four_is_a_camera_matrix():
+    projection = np.column_stack([K, np.zeros(3)]).ravel().tolist()
+    text = json.dumps({"width": 640, "height": 480, "camera_matrix": projection})
+
+    np.testing.assert_allclose(read_camera(text).matrix_px, K)
 
 
 def test_the_camera_of_astyx_is_found_among_its_sensors():
