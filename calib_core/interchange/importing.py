@@ -294,17 +294,6 @@ def _evidence(imported: ImportedCalibration, report: CheckReport, *, tested: boo
     return "imported_proven" if proven else "imported_assumed"
 
 
-def adopt(
-    imported: ImportedCalibration, source: str, *, camera: Camera | None = None, provenance: Provenance | None = None
-) -> CalibrationFile:
-    """Convert what a reader found to a calibration-1 file; `adoption` without anything to hold it against.
-
-    Raises:
-        InputError: the file contradicts itself, fails its own check point, states another camera, or there is no camera.
-    """
-    return adoption(imported, source, camera=camera, provenance=provenance).file
-
-
 def adoption(
     imported: ImportedCalibration,
     source: str,

@@ -316,9 +316,7 @@ class Recording:
             MessageError: the frame cannot be read.
             IndexError: there is no such frame.
         """
-        self._check(index)
-        assert self._assembly.images is not None
-        return self._assembly.images.encoded(index)
+        return self._frames_with(index).encoded(index)
 
     def image(self, index: int) -> np.ndarray:
         """Return a frame's pixels: uint8 (h, w, 3), blue first as in OpenCV.
@@ -330,9 +328,7 @@ class Recording:
             MessageError: the frame cannot be read.
             IndexError: there is no such frame.
         """
-        self._check(index)
-        assert self._assembly.images is not None
-        return self._assembly.images.image(index)
+        return self._frames_with(index).image(index)
 
     def recorded_format(self, index: int) -> str:
         """Return the format a frame was recorded in: "jpeg", "png", "raw bgr8", "h264 video" or "video file".
@@ -344,14 +340,15 @@ class Recording:
             MessageError: the frame cannot be read.
             IndexError: there is no such frame.
         """
-        self._check(index)
-        assert self._assembly.images is not None
-        return "video file" if self.video_start is not None else self._assembly.images.recorded_as(index)
+        frames = self._frames_with(index)
+        return "video file" if self.video_start is not None else frames.recorded_as(index)
 
-    def _check(self, index: int) -> None:
+    def _frames_with(self, index: int) -> ImageStream:
         self._check_open()
-        if not 0 <= index < len(self.image_times):
+        images = self._assembly.images
+        if images is None or not 0 <= index < len(self.image_times):
             raise IndexError(f"frame {index} of {len(self.image_times)}")
+        return images
 
     def _check_open(self) -> None:
         if self._closed.is_set():

@@ -1,7 +1,7 @@
 """What each topic can be used for, and which ones are used: by name or by figures; errors list the available topics."""
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
@@ -13,7 +13,7 @@ from calib_core.options import option
 from calib_core.recordings.box_topics import BoxLayout, box_layout
 from calib_core.recordings.camera.images import ImageLayout, is_image
 from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
-from calib_core.recordings.field_words import meaning_of
+from calib_core.recordings.field_words import meaning_of, words_in
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_plan import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
@@ -47,11 +47,7 @@ _COMPARABLE = 0.5  # with more than this of them, another radar could be meant
 _NOTHING_STATIC = 1.0  # returns a scan: the recording was made on the move
 
 
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
-_ROS_PACKAGES = _words(
+_ROS_PACKAGES = words_in(
     "actionlib_msgs builtin_interfaces control_msgs diagnostic_msgs geometry_msgs map_msgs nav_msgs rcl_interfaces "
     "rosgraph_msgs sensor_msgs shape_msgs std_msgs stereo_msgs tf tf2_msgs trajectory_msgs unique_identifier_msgs "
     "vision_msgs visualization_msgs"
@@ -347,7 +343,8 @@ def select_image(inventory: Inventory, requested: str | None) -> Topic | None:
     Raises:
         RecordingError: the requested topic does not exist or cannot be used.
     """
-    return _topic_named(inventory, "image", requested) or _best(inventory.of_kind("image"), inventory, _image_rank)
+    named = _topic_named(inventory, "image", requested)
+    return named or max(inventory.of_kind("image"), key=lambda topic: _image_rank(topic, inventory), default=None)
 
 
 def image_choice(inventory: Inventory, image: Topic | None, requested: str | None) -> str:
@@ -399,12 +396,6 @@ def _missing(inventory: Inventory, kind: TopicKind) -> RecordingError:
         f"{inventory.name}: no readable {_WORDS[kind]} topic{why}; topics: {inventory.list_topics()}; "
         f"add the file that contains one, or choose one with {_FLAGS[kind]}"
     )
-
-
-def _best(
-    topics: Sequence[Topic], inventory: Inventory, rank: Callable[[Topic, Inventory], tuple[int, ...]]
-) -> Topic | None:
-    return max(topics, key=lambda topic: rank(topic, inventory), default=None)
 
 
 def radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:

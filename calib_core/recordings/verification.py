@@ -283,7 +283,12 @@ def _lines(file: IO[bytes]) -> list[str]:
 def verification_text(verification: Verification) -> str:
     """Format a verification as text: files, messages by topic, the result last."""
     lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in verification.files]
-    lines += ["", *_table(verification), *_faults(verification), ""]
+    lines += [
+        "",
+        *_table(verification),
+        *(f"  {one.topic}: {one.fault}" for one in verification.topics if one.fault),
+        "",
+    ]
     for warning in verification.warnings:
         lines.append(f"warning   {warning.message}. [{warning.code}]")
     lines.append(f"result    {_result(verification)}")
@@ -300,12 +305,6 @@ def _table(verification: Verification) -> Iterator[str]:
 
 def _counts(check: TopicCheck) -> tuple[int, ...]:
     return check.read, check.unread, check.damaged, check.undecodable
-
-
-def _faults(verification: Verification) -> Iterator[str]:
-    for topic in verification.topics:
-        if topic.fault:
-            yield f"  {topic.topic}: {topic.fault}"
 
 
 def _result(verification: Verification) -> str:

@@ -12,44 +12,26 @@ Part = Literal["rotation", "translation", "other"]
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _JOINED = re.compile(r"(cam|camera|radar|to|from)(?=(?:cam|radar|to|from))", re.IGNORECASE)
-_ROTATION = frozenset(
-    {
-        "r",
-        "rot",
-        "rotation",
-        "orientation",
-        "attitude",
-        "rmat",
-        "rotm",
-        "q",
-        "quat",
-        "quaternion",
-        "qvec",
-        "wxyz",
-        "xyzw",
-    }
-    | {"rvec", "rvecs", "rotvec", "rodrigues", "rpy", "ypr", "euler", "angles"}
+
+
+def _set_of(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+_ROTATION = _set_of(
+    "r rot rotation orientation attitude rmat rotm q quat quaternion qvec wxyz xyzw rvec rvecs rotvec rodrigues rpy ypr euler "
+    "angles"
 )
-_TRANSLATION = frozenset(
-    {"t", "trans", "translation", "tvec", "tvecs", "xyz", "position", "pos", "offset", "origin", "location"}
-)
+_TRANSLATION = _set_of("t trans translation tvec tvecs xyz position pos offset origin location")
 _WORDS_OF_PARTS: tuple[tuple[Part, frozenset[str]], ...] = (("rotation", _ROTATION), ("translation", _TRANSLATION))
-_UNITS = {
-    "mm": "mm",
-    "millimeter": "mm",
-    "millimeters": "mm",
-    "millimetres": "mm",
-    "cm": "cm",
-    "centimeters": "cm",
-    "m": "m",
-    "meter": "m",
-    "meters": "m",
-    "metres": "m",
-    "rad": "rad",
-    "radians": "rad",
-    "deg": "deg",
-    "degrees": "deg",
-}
+_SPELT = (
+    ("mm", "mm millimeter millimeters millimetres"),
+    ("cm", "cm centimeters"),
+    ("m", "m meter meters metres"),
+    ("rad", "rad radians"),
+    ("deg", "deg degrees"),
+)
+_UNITS = {word: unit for unit, words in _SPELT for word in words.split()}
 _OF_AXES = {
     "optical": ("camera", "optical"),
     "link": ("camera", "body"),
@@ -60,9 +42,8 @@ _OF_AXES = {
     "frd": ("radar", "frd"),
     "rfu": ("radar", "rfu"),
 }
-_OTHERS = frozenset(
-    {"imu", "gps", "gnss", "ego", "vehicle", "chassis"}
-    | {"base", "world", "map", "robot", "rig", "platform", "odom", "gripper", "tool", "flange", "effector", "drone"}
+_OTHERS = _set_of(
+    "imu gps gnss ego vehicle chassis base world map robot rig platform odom gripper tool flange effector drone"
 )
 _NAMED = 0.2
 _FROM, _TO = ("from", "wrt", "in"), ("to", "2")

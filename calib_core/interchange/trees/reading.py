@@ -1,6 +1,6 @@
 """Read the frame tree in one file, several files or a folder: URDF, transforms of ROS, Autoware, Apollo, nuScenes, rigs."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -89,7 +89,7 @@ def joined_tree(files: Sequence[TreeFile], recorded: Sequence[Joint]) -> FrameTr
     tables: dict[str, Content] = {}
     poses: list[tuple[Content, str]] = []
     for file in files:
-        for content in _contents(file):
+        for content in readings(file.data, source=file.source):
             if recognizes_sensors(content):
                 tables[str(Path(file.source).parent)] = content
             elif recognizes_poses(content):
@@ -111,15 +111,7 @@ def joined_tree(files: Sequence[TreeFile], recorded: Sequence[Joint]) -> FrameTr
         raise InputError(
             f"{', '.join(file.source for file in files)}: no transforms between frames; give the files with them"
         )
-    return joined(sorted(parts, key=_without_joints))
-
-
-def _contents(file: TreeFile) -> Iterable[Content]:
-    return readings(file.data, source=file.source)
-
-
-def _without_joints(part: TreePart) -> bool:
-    return not part.joints
+    return joined(sorted(parts, key=lambda part: not part.joints))
 
 
 def _posed_by_tables(poses: list[tuple[Content, str]], tables: Mapping[str, Content]) -> Iterator[TreePart]:

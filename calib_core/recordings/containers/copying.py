@@ -270,7 +270,9 @@ def copy_besides(source: McapSource, besides: BesidesMessages, writer: McapWrite
                 writer.metadata_record(records.string_at(body, 0)[0], body)
             else:
                 head = _attachment_head(source.file.up_to(part.start, min(_HEAD_BYTES, part.end - part.start)))
-                writer.attachment_record(head, part.end - part.start, _pieces(source, part))
+                places = range(part.start, part.end, _PIECE_BYTES)
+                pieces = (source.file.up_to(place, min(_PIECE_BYTES, part.end - place)) for place in places)
+                writer.attachment_record(head, part.end - part.start, pieces)
         except (struct.error, RecordingError):
             damaged += 1
     return damaged
@@ -281,11 +283,6 @@ def _attachment_head(body: bytes) -> AttachmentHead:
     name, place = records.string_at(body, 16)
     media_type, place = records.string_at(body, place)
     return AttachmentHead(name, media_type, log_time, create_time, struct.unpack_from("<Q", body, place)[0])
-
-
-def _pieces(source: McapSource, part: Part) -> Iterator[bytes]:
-    for index in range(part.start, part.end, _PIECE_BYTES):
-        yield source.file.up_to(index, min(_PIECE_BYTES, part.end - index))
 
 
 def sent(source: McapSource, chunk: int, offset: int) -> tuple[int, int]:

@@ -12,7 +12,7 @@ import sys
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -216,10 +216,6 @@ def heads_from(cache: FileCache | None, index: MessageIndex, size: int) -> Heads
 
 def _heads_name(index: MessageIndex, size: int) -> str:
     digest = hashlib.sha1(str(size).encode(), usedforsecurity=False)
-    for column in _columns(index):
+    for column in (index.chunk, index.offset):
         digest.update(np.ascontiguousarray(column).tobytes())
     return f"heads-{digest.hexdigest()[:20]}"
-
-
-def _columns(index: MessageIndex) -> Sequence[np.ndarray]:
-    return index.chunk, index.offset

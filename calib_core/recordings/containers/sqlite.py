@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 import shutil
 from collections import deque
 from dataclasses import dataclass, replace
+from itertools import chain
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
@@ -200,17 +201,12 @@ def _batches(connection: sqlite3.Connection, query: str, values: tuple[int, ...]
     cursor = connection.execute(query, values)
     while rows := cursor.fetchmany(_BATCH_ROWS):
         try:
-            batches.append(np.fromiter(_flat(rows), dtype=np.int64, count=3 * len(rows)).reshape(-1, 3))
+            batches.append(np.fromiter(chain.from_iterable(rows), dtype=np.int64, count=3 * len(rows)).reshape(-1, 3))
         except (TypeError, ValueError, OverflowError):
             good = [row for row in rows if all(type(value) is int for value in row)]
             strange += len(rows) - len(good)
             batches.append(np.array(good, dtype=np.int64).reshape(-1, 3))
     return batches, strange
-
-
-def _flat(rows: list[tuple[int, int, int]]) -> Iterator[int]:
-    for row in rows:
-        yield from row
 
 
 def _joined(batches: list[np.ndarray]) -> np.ndarray:
@@ -475,10 +471,8 @@ class SqliteSource:
             raise self._damaged(f"row {chunk} is missing")
         if not isinstance(rows[0][0], bytes):
             raise self._damaged(f"row {chunk} contains no bytes")
-        return self._unpacked(rows[0][0], chunk)
-
-    def _unpacked(self, data: bytes, row: int) -> bytes:
-        return unpack_message(data, where=f"{self.path}: row {row}") if self._packed else data
+        data = rows[0][0]
+        return unpack_message(data, where=f"{self.path}: row {chunk}") if self._packed else data
 
     def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Read the first bytes of many messages: short ones by query, long ones without their overflow pages."""

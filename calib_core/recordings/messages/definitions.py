@@ -310,13 +310,10 @@ def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Fi
             package = owner.partition("/")[0]
             kind = "std_msgs/Header" if kind == "Header" else f"{package}/{kind}"
             if "/" in entry.type or kind not in types:
-                kind = _known_type(entry.type if "/" in entry.type else kind, owner)
+                unknown = entry.type if "/" in entry.type else kind
+                raise MessageError(f"the definition of {owner} uses {unknown}, which is not defined in the recording")
         resolved.append(replace(entry, type=kind))
     return tuple(resolved)
-
-
-def _known_type(kind: str, owner: str) -> str:
-    raise MessageError(f"the definition of {owner} uses {kind}, which is not defined in the recording")
 
 
 def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:

@@ -174,16 +174,14 @@ def _sensor(
     )
     repeats: list[int] = []
     for index, i in enumerate(order):
-        first = [k for k in range(index) if repeats[k] == k and related[_pair(order[k], i)] == "alternatives"]
+        first = [
+            k for k in range(index) if repeats[k] == k and related[min(order[k], i), max(order[k], i)] == "alternatives"
+        ]
         repeats.append(first[0] if first else index)
     names = tuple(topics[i].name for i in order)
     copies = tuple(topics[j].name for j, i in copy_of.items() if i in group)
     own = [topics[i].figures for index, i in enumerate(order) if repeats[index] == index]
     return RadarSensor(sensor_name(names), names, tuple(repeats), copies, topics[order[0]].frame, _all_together(own))
-
-
-def _pair(i: int, j: int) -> tuple[int, int]:
-    return (i, j) if i < j else (j, i)
 
 
 def sensor_name(topics: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.exporting import export
 from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.interchange.formats.registry import FORMATS, format_named
-from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.importing import adoption, read_any
 from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.synthetic.rig import random_rig
@@ -564,6 +564,6 @@ def test_a_calibration_is_compared_with_the_truth_of_a_simulation_which_is_not_i
     assert report.verdict == "right"
     assert report.comparison.rotation_deg == pytest.approx(0, abs=1e-9)
     with pytest.raises(InputError, match="is the ground truth of a simulation"):
-        adopt(read_any(truth), "truth.json")
+        adoption(read_any(truth), "truth.json")
     with pytest.raises(InputError, match=r"camera_from_radar\.rotation: missing"):
         read_any('{"schema": "cocalib/truth-1"}')

@@ -30,7 +30,7 @@ from calib_core.interchange.check.report import check
 from calib_core.interchange.exporting import contents_text, export
 from calib_core.interchange.format import imported
 from calib_core.interchange.formats.registry import FORMATS
-from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.importing import adoption, read_any
 from calib_core.interchange.own.calibration_json import (
     calibration_file,
     calibration_text,
@@ -382,7 +382,7 @@ def test_an_export_that_holds_the_calibration_keeps_it(file):
     stated = replace(file, vehicle=FULL)
     written = export(stated, "json")
     assert written.content == write_calibration(stated)
-    assert adopt(read_any(written.data, written.file_name), written.file_name).vehicle == FULL
+    assert adoption(read_any(written.data, written.file_name), written.file_name).file.vehicle == FULL
 
 
 def test_a_script_states_it_too(file, tmp_path):

@@ -16,7 +16,7 @@ from calib_core.interchange.check.report import check
 from calib_core.interchange.exporting import export
 from calib_core.interchange.format import Format, ImportedCalibration, imported
 from calib_core.interchange.formats.registry import FORMATS, format_named
-from calib_core.interchange.importing import adopt, adoption, read_any
+from calib_core.interchange.importing import adoption, read_any
 from calib_core.interchange.own.calibration_json import calibration_sha256, read_calibration, write_calibration
 from calib_core.interchange.statement import stated_origin
 
@@ -68,20 +68,20 @@ def test_opencvs_storage_keeps_the_evidence_where_a_program_writes_it_again_with
     found = read_any(rewritten)
     assert (found.evidence, found.calibration_sha256) == ("imported_assumed", calibration_sha256(assumed))
     assert found.check_point is not None
-    assert adopt(found, "t.yml", camera=file.calibration.camera).rests_on == "imported_assumed"
+    assert adoption(found, "t.yml", camera=file.calibration.camera).file.rests_on == "imported_assumed"
 
 
 def test_a_bare_matrix_is_assumed_and_a_check_point_proves_a_file(file):
     camera = file.calibration.camera
-    assert adopt(read_any(bare(file)), "m.txt", camera=camera).rests_on == "imported_assumed"
-    assert adopt(read_any(text_of(file, "tf2")), "t.sh", camera=camera).rests_on == "imported_proven"
+    assert adoption(read_any(bare(file)), "m.txt", camera=camera).file.rests_on == "imported_assumed"
+    assert adoption(read_any(text_of(file, "tf2")), "t.sh", camera=camera).file.rests_on == "imported_proven"
 
 
 def test_what_was_assumed_stays_assumed_through_a_check_point_of_its_own(file):
-    assumed = adopt(read_any(bare(file)), "m.txt", camera=file.calibration.camera)
-    again = adopt(read_any(text_of(assumed, "tf2")), "t.sh", camera=file.calibration.camera)
+    assumed = adoption(read_any(bare(file)), "m.txt", camera=file.calibration.camera).file
+    again = adoption(read_any(text_of(assumed, "tf2")), "t.sh", camera=file.calibration.camera).file
     assert again.rests_on == "imported_assumed"
-    assert adopt(read_any(write_calibration(assumed)), "c.json").rests_on == "imported_assumed"
+    assert adoption(read_any(write_calibration(assumed)), "c.json").file.rests_on == "imported_assumed"
 
 
 def test_pairs_or_a_calibration_prove_what_a_file_means(golden_text, file):
@@ -89,7 +89,7 @@ def test_pairs_or_a_calibration_prove_what_a_file_means(golden_text, file):
     pairs = read_check_pairs(golden_text)
     for proof in ({"pairs": pairs}, {"against": imported(file)}):
         assert adoption(found, "m.txt", camera=camera, **proof).file.rests_on == "imported_proven"
-    assumed = adopt(found, "m.txt", camera=camera)
+    assumed = adoption(found, "m.txt", camera=camera).file
     proven = adoption(imported(assumed), "c.json", pairs=pairs).file
     assert proven.rests_on == "imported_proven"
     wrong = read_any(bare(file, inverse=True))
@@ -103,9 +103,9 @@ def test_another_camera_than_the_files_is_refused(file, name):
     found = read_any(export(file, name, rectified=format_named(name).is_for_rectified).data)
     moved_px = np.array([[0.0, 0.0, 8.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     other = Camera(camera.model, camera.width_px, camera.height_px, camera.matrix_px + moved_px, camera.distortion)
-    assert adopt(found, "f", camera=camera).calibration.camera.matrix_px.tolist() == camera.matrix_px.tolist()
+    assert adoption(found, "f", camera=camera).file.calibration.camera.matrix_px.tolist() == camera.matrix_px.tolist()
     with pytest.raises(InputError, match=r"states a camera .* other than the given one .* --replace-camera"):
-        adopt(found, "f", camera=other)
+        adoption(found, "f", camera=other)
     assert adoption(found, "f", camera=other, replace_camera=True).file.calibration.camera is other
 
 
@@ -138,7 +138,7 @@ def test_a_frame_without_optical_has_body_axes_unless_its_numbers_fit_optical_on
 
 
 def test_the_file_that_was_imported_is_named_without_its_folder(file):
-    made = adopt(read_any(bare(file)), "secret/m.txt", camera=file.calibration.camera)
+    made = adoption(read_any(bare(file)), "secret/m.txt", camera=file.calibration.camera).file
     said = next(one.facts["message"] for one in made.calibration.warnings if one.code == "imported")
     assert "imported from m.txt" in said
     assert "secret" not in said
@@ -215,7 +215,7 @@ def test_the_covariance_survives_arrays_with_its_order(proven):
 
     assert found.covariance is not None
     np.testing.assert_array_equal(found.covariance, covariance)
-    np.testing.assert_array_equal(adopt(found, "file").calibration.covariance, covariance)
+    np.testing.assert_array_equal(adoption(found, "file").file.calibration.covariance, covariance)
 
 
 def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven):

@@ -195,7 +195,7 @@ def channel_of(header: Mapping[str, bytes], data: bytes) -> Channel | None:
     if fields is None or "conn" not in header:
         return None
     return Channel(
-        id=_number(header["conn"], 4),
+        id=int.from_bytes(header["conn"], "little") if len(header["conn"]) == 4 else -1,
         topic=_text(header.get("topic", b"")),
         type=_text(fields.get("type", b"")),
         encoding="ros1",
@@ -408,10 +408,6 @@ def _merged(parts: Sequence[tuple[int, bytes]]) -> MessageIndex:
     lengths = [len(data) // _ENTRY.itemsize for _, data in parts]
     chunk = np.repeat(np.array([number for number, _ in parts], dtype=np.int64), lengths)
     return MessageIndex.sorted_from(receive_ns, chunk, entries["offset"].astype(np.int64))
-
-
-def _number(value: bytes, size: int) -> int:
-    return int.from_bytes(value, "little") if len(value) == size else -1
 
 
 def _text(value: bytes) -> str:

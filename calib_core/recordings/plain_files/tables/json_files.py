@@ -84,7 +84,7 @@ def read_json_rows(table: JsonTable, places: Sequence[int], times: TimeReader | 
     for line, row in _rows(table.path):
         cells = [row.get(name, "") for name in table.names]
         try:
-            numbers = [_number(cells[place]) for place in places]
+            numbers = [float("nan" if (cell := cells[place]).lower() in _NOTHING else cell) for place in places]
             stamps.append(times.read(times.key(cells)) if times else 0)
         except (ValueError, OverflowError, RecordingError) as error:
             raise RecordingError(f"{table.path}: line {line}: {error}; fix or remove the line") from error
@@ -107,10 +107,6 @@ def _is_cut_off(path: Path) -> bool:
         return not json_value(last.decode("utf-8", "replace"), source=path.name)
     except InputError:
         return True
-
-
-def _number(text: str) -> float:
-    return float("nan") if text.lower() in _NOTHING else float(text)
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:

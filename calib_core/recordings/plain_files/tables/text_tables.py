@@ -12,7 +12,7 @@ from itertools import islice
 from operator import itemgetter
 from os import SEEK_END
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class TextTable:
             with TextIOWrapper(_open_text(self.path, self.content), self.encoding, newline="") as file:
                 for _ in range(self.skipped_lines):
                     file.readline(_HEAD_BYTES)
-                yield _reader(file, self.separator)
+                yield csv.reader(file, delimiter=self.separator, skipinitialspace=self.separator == " ")
         except (OSError, UnicodeError, csv.Error) as error:
             raise RecordingError(f"{self.path}: cannot be read as a table: {error}") from error
 
@@ -95,10 +95,6 @@ class TableRows:
     times_ns: TimesNs
     values: np.ndarray
     is_cut_off: bool = False
-
-
-def _reader(file: TextIO, separator: str) -> Iterator[list[str]]:
-    return csv.reader(file, delimiter=separator, skipinitialspace=separator == " ")
 
 
 def _open_text(path: Path, content: bytes | None) -> BinaryIO:

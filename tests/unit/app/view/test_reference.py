@@ -10,7 +10,7 @@ from calib_core.association.placements import Placement
 from calib_core.errors import InputError
 from calib_core.interchange.exporting import export
 from calib_core.interchange.formats.registry import FORMATS, format_named
-from calib_core.interchange.importing import adopt, read_any
+from calib_core.interchange.importing import adoption, read_any
 from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
 from calib_core.measurements import (
     RadarScan,
@@ -115,7 +115,7 @@ def test_returns_and_placements_are_drawn_where_the_calibration_reprojects_them(
 def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file, name):
     found = read_any(export(file, name, rectified=format_named(name).is_for_rectified).data, name)
     camera = None if found.camera else file.calibration.camera
-    text = write_calibration(adopt(found, name, camera=camera))
+    text = write_calibration(adoption(found, name, camera=camera).file)
     again = read_calibration(text)
     poses = [one.calibration.camera_from_radar.as_matrix() for one in (again, file)]
     np.testing.assert_allclose(*poses, rtol=0, atol=1e-9)
@@ -128,9 +128,9 @@ def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file,
 def test_what_cannot_be_adopted_is_refused_with_a_clear_error(file, tmp_path):
     text, path, calibration = export(file, "tf2").data.decode(), tmp_path / "wrong.sh", file.calibration
     with pytest.raises(InputError, match="tf2 contains no camera"):
-        adopt(read_any(text), "x.sh")
+        adoption(read_any(text), "x.sh")
     with pytest.raises(InputError, match="omit the other camera"):
-        adopt(read_any(write_calibration(file)), "x.json", camera=calibration.camera)
+        adoption(read_any(write_calibration(file)), "x.json", camera=calibration.camera)
     inverse = dataclasses.replace(calibration, camera_from_radar=calibration.camera_from_radar.inverse())
     swapped = export(dataclasses.replace(file, calibration=inverse), "tf2").data.decode()
     path.write_text("\n".join(text.splitlines()[:-3] + swapped.splitlines()[-3:]))
