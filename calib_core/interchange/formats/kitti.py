@@ -1,6 +1,8 @@
 """KITTI's object calibration, for rectified images; View-of-Delft uses the same keys for its radar."""
 
+import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -77,23 +79,23 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: a line is missing or has too few or too many numbers.
     """
-    lines = _values_by_key(content, source=source)
+    lines = keyed_lines(content.text, source=source)
     key, *others = [key for key in _POSE_KEYS if key in lines] or [""]
     if not key:
         raise InputError(f"{source}: no Tr_velo_to_cam in it; add that line")
     if others:
         raise InputError(f"{source}: both {key} and {others[0]} are in it; keep only the radar's")
-    pose = np.reshape(floats(lines[key].split(), source=source, place=key, length=12), (3, 4))
+    pose = numbers_of(lines, key, 3, 4, source=source)
     notes = []
     rectified = "R0_rect" in lines
     if rectified:
-        rotation = np.reshape(floats(lines["R0_rect"].split(), source=source, place="R0_rect", length=9), (3, 3))
+        rotation = numbers_of(lines, "R0_rect", 3, 3, source=source)
         if np.abs(rotation - np.eye(3)).max() > 0:
             pose = rotation @ pose
             notes.append("R0_rect was applied; the camera is the rectified one")
     matrix_px = None
     if "P2" in lines:
-        projection = np.reshape(floats(lines["P2"].split(), source=source, place="P2", length=12), (3, 4))
+        projection = numbers_of(lines, "P2", 3, 4, source=source)
         matrix_px = projection[:, :3]
         if projection[:, 3].any():
             pose = pose + np.column_stack([np.zeros((3, 3)), _offset_m(projection, source=source)])
@@ -123,7 +125,7 @@ def _of_lidar(key: str, lines: dict[str, str], source: str) -> tuple[str, ...]:
 def _check_point(lines: dict[str, str], *, source: str) -> StatedCheckPoint | None:
     if _CHECK_POINT not in lines:
         return None
-    numbers = np.array(floats(lines[_CHECK_POINT].split(), source=source, place=_CHECK_POINT, length=8))
+    numbers = numbers_of(lines, _CHECK_POINT, 8, source=source)
     return StatedCheckPoint(numbers[:3], numbers[3:6], rectified_px=numbers[6:])
 
 
@@ -139,21 +141,38 @@ def _sha256(value: str) -> str | None:
     return bytes(numbers).hex()
 
 
-def _values_by_key(content: Content, *, source: str) -> dict[str, str]:
+def keyed_lines(text: str, *, source: str) -> dict[str, str]:
     """Return what follows each key.
 
     Raises:
         InputError: a key appears twice, so that readers disagree on which line counts.
     """
     values: dict[str, str] = {}
-    for line in content.text.splitlines():
+    for line in text.splitlines():
         key, colon, value = line.partition(":")
-        if not colon or line.startswith("#"):
+        if not colon or line.lstrip().startswith("#"):
             continue
-        if key in values:
-            raise InputError(f"{source}: {key} appears twice; keep only the intended line")
-        values[key] = value
+        if key.strip() in values:
+            raise InputError(f"{source}: {key.strip()} appears twice; keep only the intended line")
+        values[key.strip()] = value
     return values
+
+
+def numbers_of(lines: Mapping[str, str], key: str, *shape: int, source: str) -> np.ndarray:
+    """Return the numbers after a key.
+
+    Args:
+        lines: from `keyed_lines`.
+        key: before the colon.
+        shape: of the array.
+        source: the name of the file in error messages.
+
+    Raises:
+        InputError: there is no such line, or it has too few or too many numbers.
+    """
+    if key not in lines:
+        raise InputError(f"{source}: no {key} in it; add that line")
+    return np.reshape(floats(lines[key].split(), source=source, place=key, length=math.prod(shape)), shape)
 
 
 def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:

@@ -1,6 +1,5 @@
 """KITTI's raw data (calib_velo_to_cam.txt with calib_cam_to_cam.txt beside it) and odometry (calib.txt with Tr)."""
 
-from collections.abc import Mapping
 from pathlib import PurePath
 
 import numpy as np
@@ -8,8 +7,8 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
-from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
+from calib_core.interchange.formats.kitti import keyed_lines, numbers_of
 from calib_core.interchange.formats.pose_parts import rigid
 from calib_core.interchange.syntax.content import Content
 
@@ -17,29 +16,6 @@ _CAMERAS = "calib_cam_to_cam.txt"
 _AS_RADAR = "the Velodyne's frame is taken to be the radar's; KITTI has no radar"
 _UNDISTORTED = "assumed that the images are undistorted, those of image_02"
 _ROUNDING = 1e-3
-
-
-def _keyed(text: str, *, source: str) -> dict[str, str]:
-    """Return the numbers of each line by its key.
-
-    Raises:
-        InputError: a key appears twice.
-    """
-    lines: dict[str, str] = {}
-    for line in text.splitlines():
-        key, colon, numbers = line.partition(":")
-        if not colon or line.lstrip().startswith("#"):
-            continue
-        if key.strip() in lines:
-            raise InputError(f"{source}: {key.strip()} appears twice; keep one")
-        lines[key.strip()] = numbers
-    return lines
-
-
-def _numbers(lines: Mapping[str, str], key: str, length: int, *, source: str) -> np.ndarray:
-    if key not in lines:
-        raise InputError(f"{source}: no {key} in it; add that line")
-    return np.array(floats(lines[key].split(), source=source, place=key, length=length))
 
 
 def _recognizes_raw(content: Content) -> bool:
@@ -57,21 +33,21 @@ def _read_raw(content: Content, source: str) -> ImportedCalibration:
         raise InputError(
             f"{source}: KITTI's pose between IMU and Velodyne, without a camera; give calib_velo_to_cam.txt"
         )
-    lines = _keyed(content.text, source=source)
-    rotation = _numbers(lines, "R", 9, source=source)
-    translation_m = _numbers(lines, "T", 3, source=source)
-    camera0_from_radar = rigid("matrix", rotation.reshape(3, 3), translation_m, source=source)
+    lines = keyed_lines(content.text, source=source)
+    rotation = numbers_of(lines, "R", 3, 3, source=source)
+    translation_m = numbers_of(lines, "T", 3, source=source)
+    camera0_from_radar = rigid("matrix", rotation, translation_m, source=source)
     if _CAMERAS not in content.beside:
         return _calibration_of(
             camera0_from_radar,
             f"no {_CAMERAS} beside the file: the camera is camera 0 before rectification",
             source=source,
         )
-    beside = _keyed(content.beside[_CAMERAS].decode("utf-8", errors="replace"), source=_CAMERAS)
-    rectifying = _numbers(beside, "R_rect_00", 9, source=_CAMERAS).reshape(3, 3)
+    beside = keyed_lines(content.beside[_CAMERAS].decode("utf-8", errors="replace"), source=_CAMERAS)
+    rectifying = numbers_of(beside, "R_rect_00", 3, 3, source=_CAMERAS)
     rectified_from_camera0 = rigid("matrix", rectifying, np.zeros(3), source=_CAMERAS)
-    projection = _numbers(beside, "P_rect_02", 12, source=_CAMERAS).reshape(3, 4)
-    size = _numbers(beside, "S_rect_02", 2, source=_CAMERAS)
+    projection = numbers_of(beside, "P_rect_02", 3, 4, source=_CAMERAS)
+    size = numbers_of(beside, "S_rect_02", 2, source=_CAMERAS)
     return _projected(
         rectified_from_camera0 @ camera0_from_radar, projection, (int(size[0]), int(size[1])), source=source
     )
@@ -90,14 +66,14 @@ def _read_odometry(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: a line is missing or has the wrong number of values.
     """
-    lines = _keyed(content.text, source=source)
-    matrix = _numbers(lines, "Tr", 12, source=source).reshape(3, 4)
+    lines = keyed_lines(content.text, source=source)
+    matrix = numbers_of(lines, "Tr", 3, 4, source=source)
     camera0_from_radar = rigid("matrix", matrix[:, :3], matrix[:, 3], source=source)
     if "P2" not in lines:
         return _calibration_of(
             camera0_from_radar, "no P2 in the file: the camera is the rectified camera 0", source=source
         )
-    projection = _numbers(lines, "P2", 12, source=source).reshape(3, 4)
+    projection = numbers_of(lines, "P2", 3, 4, source=source)
     return _projected(camera0_from_radar, projection, None, source=source)
 
 

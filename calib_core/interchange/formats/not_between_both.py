@@ -1,7 +1,7 @@
 """Files that hold no pose between a radar and a camera, recognized to say what they hold and what to do instead."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from calib_core.errors import InputError
@@ -43,52 +43,36 @@ def _is_k_radar_camera(content: Content) -> bool:
     return {"x_ldr2cam", "roll_ldr2cam"} <= set(content.mapping)
 
 
-def _refuse_k_radar_camera(content: Content, source: str) -> NoReturn:
-    """Refuse the pose of K-Radar's lidar.
-
-    Raises:
-        InputError: always.
-    """
-    raise InputError(
-        f"{source}: a camera of K-Radar: the *_ldr2cam numbers carry points of the lidar into the camera, and the radar is not "
-        "in the file; info_calib/calib_radar_lidar.txt has the radar's offset in x and y only. Multiply "
-        "Rx(roll) Ry(pitch) Rz(yaw) with the radar's position in the lidar, its height included, and give the 4x4 matrix"
-    )
-
-
 def _is_k_radar_offset(content: Content) -> bool:
     return content.syntax == "lines" and bool(content.lines) and bool(_OFFSET_HEADER.match(content.lines[0].strip()))
-
-
-def _refuse_k_radar_offset(content: Content, source: str) -> NoReturn:
-    """Refuse the offset between K-Radar's lidar and radar.
-
-    Raises:
-        InputError: always.
-    """
-    raise InputError(
-        f"{source}: K-Radar's offset between lidar and radar, x and y in metres without height or rotation, and no camera; "
-        "give the 4x4 matrix that carries radar points into the camera"
-    )
 
 
 def _is_kitti_cameras(content: Content) -> bool:
     return any(line.startswith("P_rect_02:") for line in content.lines)
 
 
-def _refuse_kitti_cameras(content: Content, source: str) -> NoReturn:
-    """Refuse KITTI's calibration of the cameras with each other.
+def _refusing(recognizes: Callable[[Content], bool], why: str) -> Reads:
+    """Return a reader that refuses what it recognizes."""
 
-    Raises:
-        InputError: always.
-    """
-    raise InputError(
-        f"{source}: KITTI's cameras, without the sensor that measures; give calib_velo_to_cam.txt, this file is read "
-        "from beside it"
-    )
+    def refuse(_content: Content, source: str) -> NoReturn:
+        raise InputError(f"{source}: {why}")
+
+    return Reads(recognizes, refuse)
 
 
 KALIBR_CHAIN = Reads(_is_kalibr_chain, _refuse_kalibr_chain)
-K_RADAR_CAMERA = Reads(_is_k_radar_camera, _refuse_k_radar_camera)
-K_RADAR_OFFSET = Reads(_is_k_radar_offset, _refuse_k_radar_offset)
-KITTI_CAMERAS = Reads(_is_kitti_cameras, _refuse_kitti_cameras)
+K_RADAR_CAMERA = _refusing(
+    _is_k_radar_camera,
+    "a camera of K-Radar: the *_ldr2cam numbers carry points of the lidar into the camera, and the radar is not in the file; "
+    "info_calib/calib_radar_lidar.txt has the radar's offset in x and y only. Multiply Rx(roll) Ry(pitch) Rz(yaw) with the "
+    "radar's position in the lidar, its height included, and give the 4x4 matrix",
+)
+K_RADAR_OFFSET = _refusing(
+    _is_k_radar_offset,
+    "K-Radar's offset between lidar and radar, x and y in metres without height or rotation, and no camera; give the 4x4 "
+    "matrix that carries radar points into the camera",
+)
+KITTI_CAMERAS = _refusing(
+    _is_kitti_cameras,
+    "KITTI's cameras, without the sensor that measures; give calib_velo_to_cam.txt, this file is read from beside it",
+)
