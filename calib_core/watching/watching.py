@@ -31,6 +31,8 @@ _WINDOWS_NS = tuple(s * NS_PER_S for s in (6, 12, 24, 48))
 _TRAFFIC_SIGMAS = 5.0
 _IMAGE_SIGMAS, _IMAGE_RAD = 4.0, np.deg2rad(0.03)
 _RETURNS_SIGMAS, _RETURNS_RAD = 5.0, np.deg2rad(0.2)
+_MOST_FRAMES = 160
+"""Of a stretch, that are searched for what moves: five a second."""
 _AT_ONCE = 2.0
 """Times the smallest turn that counts: a single stretch then shows it."""
 _AVERAGED = 4
@@ -171,7 +173,9 @@ def _between(table: BoxTable, start: int, end: int) -> BoxTable:
 def _moving_table(recording: WatchedRecording, frames: np.ndarray, tracks: int) -> BoxTable | None:
     """Return boxes around what moves in some frames, with tracks of their own; None if nothing does, or the camera itself."""
     try:
-        boxes = changed_boxes(lambda i: recording.image(int(frames[i])), recording.image_times[frames])
+        boxes = changed_boxes(
+            lambda i: recording.image(int(frames[i])), recording.image_times[frames], most_frames=_MOST_FRAMES
+        )
     except (InputError, NoAnswerError):
         return None
     table = box_table(boxes)
