@@ -316,7 +316,7 @@ def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
     box = solved.page.locator(DIALOG).bounding_box()
     assert box is not None
     assert box["width"] > 0.99 * solved.value("innerWidth")
-    expect(solved.page.locator(f"{DIALOG} .check-point")).to_be_in_viewport()
+    expect(solved.page.locator(f"{DIALOG} .frames")).to_be_in_viewport()
 
 
 def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
