@@ -261,8 +261,8 @@ def verdict_row(verdict: Verdict, session: Session, left: int | None) -> Verdict
         verdict, outcome, tuple(used), do_not_fit if misfits else Words(), suspect, left != 0, bool(session.clicks)
     )
     rule = next((rule for rule in _RULES if rule.holds(seen)), _AS_STATED)
-    asks = rule.kind == "asks" and doubt is not None
-    action = ReviewPairs((doubt.id,)) if asks else action_of(verdict)
+    asks = rule.kind == "asks"
+    action = ReviewPairs((doubt.id,)) if asks and doubt is not None else action_of(verdict)
     asked = say("Is the mark of {pair} on the inner corner?", pair=suspect) if asks else Words()
     return VerdictRow(
         level="coarse" if rule.kind in ("asks", "wrong") else verdict.level,
