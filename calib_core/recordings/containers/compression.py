@@ -6,7 +6,6 @@ import shutil
 import sys
 import zlib
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -239,7 +238,11 @@ def _unpacker(kind: str, where: str) -> _Unpacker:
 
 def zstandard() -> Any:
     """Return the module of Zstandard, which Python has since 3.14."""
-    return import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")
+    if sys.version_info >= (3, 14):
+        from compression import zstd
+    else:
+        from backports import zstd
+    return zstd
 
 
 def _damage() -> tuple[type[Exception], ...]:
