@@ -176,6 +176,8 @@ def enter_does_nothing_else(page: Driver) -> None:
     page.press("ArrowRight")
     page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
     page.press("Enter")
+    assert page.value("__cocalib.state.cross") is None
+    page.press("g")
     page.until("__cocalib.state.cross")
 
 
@@ -239,6 +241,8 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     page.until("!__cocalib.state.proposals.on")
     page.until("!document.getElementById('guide').textContent.includes('sure')")
     page.press("Enter")
+    assert page.value("__cocalib.state.cross") is None
+    page.press("g")
     page.until("__cocalib.state.cross")
     assert page.view["clicks"] == []
 
