@@ -12,9 +12,13 @@ import cv2
 import numpy as np
 import pytest
 
+import calib_core as cc
+from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import rotation_angle_rad
 from calib_core.interchange.exporting import export_all
 from calib_core.interchange.formats.registry import written_formats
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.statement import POSE_ONLY
 from cocalib.cli import demo
@@ -148,6 +152,27 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
         np.testing.assert_allclose(written.camera_from_radar.as_matrix(), CAMERA_FROM_RADAR, atol=1e-6)
         assert (written.camera.width_px, written.camera.height_px) == SIZE
         assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
+
+
+def test_the_format_decides_which_returns_a_pose_is_for_unless_the_user_does(cocalib, tmp_path):
+    errors = SystematicErrors(azimuth_scale=0.04, range_bias_m=0.05)
+    drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
+    calibration = tmp_path / "calibration.json"
+    cc.write_calibration(calibration, calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
+    for name, wanted, raw in (("opencv", (), True), ("tf2", (), False), ("tf2", ("--for", "raw"), True)):
+        out = tmp_path / name
+        answer = cocalib("export", calibration, "--to", name, *wanted, "--out", out)
+        assert (answer.code, read_any(out.read_bytes()).for_raw) == (0, raw)
+        assert f"--for {'corrected' if raw else 'raw'} (the camera moves " in answer.err
+        assert cocalib("check", out, "--of", calibration).code == 0
+    every = tmp_path / "all"
+    assert cocalib("export", calibration, "--to", "all", "--for", "corrected", "--out", every).code == 0
+    assert not read_any((every / "radar_camera.yml").read_bytes()).for_raw
+    urdf = every / "radar_camera.urdf"
+    changed = cocalib("export", calibration, "--into", urdf, "--for", "raw")
+    assert changed.code == 0
+    assert "--for corrected" in changed.err
+    assert changed.out
 
 
 def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_why(cocalib, golden, tmp_path):
