@@ -8,7 +8,8 @@ from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, DataWarning, ReflectorClick, TimeNs
 from calib_core.watching.still_image import Turn
 
-MOST_IMAGES = 40
+FEW_IMAGES, MOST_IMAGES = 5, 16
+"""That are looked at first, and to say when if these show a turn."""
 _LEAST_REGISTERED = 0.8  # of the images: where fewer register, the rig moves
 _SIGMAS = 5.0
 _SCATTER = 3.0

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from calib_core.arrays import TimesNs
 from calib_core.association.pairing import RadarSource, half_window_s, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
@@ -30,7 +31,7 @@ from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.pair_tables import PairTable, read_pair_table
-from calib_core.measurements import NS_PER_S, Candidate, DataWarning, ReflectorClick, Unsolvable
+from calib_core.measurements import NS_PER_S, Candidate, DataWarning, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, RecordingOptions, assumption_warnings
 from calib_core.recordings.containers.sources import Assumption
@@ -39,7 +40,7 @@ from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import lost_data, lost_returns
 from calib_core.watching.still_image import Turn, camera_turn, reduced_grey
-from calib_core.watching.turned_camera import MOST_IMAGES, camera_turned
+from calib_core.watching.turned_camera import FEW_IMAGES, MOST_IMAGES, camera_turned
 from calib_core.words.warnings import warning_remark
 from cocalib.platform.resources import version
 from cocalib.session.state import Outcome
@@ -127,21 +128,30 @@ def camera_turned_warnings(
     recording: Recording, clicks: Sequence[ReflectorClick], camera: Camera, options: CalibrationOptions
 ) -> tuple[DataWarning, ...]:
     """Warn if the camera turned between the images that were clicked; silent where the rig moves."""
-    every = sorted({click.image_time for click in clicks if click.counts})
-    times = (
-        [every[i] for i in np.unique(np.linspace(0, len(every) - 1, MOST_IMAGES).round().astype(int))] if every else []
-    )
-    indices = {time: int(np.searchsorted(recording.image_times, time)) for time in times}
-    frames = {time: grey for time, i in indices.items() if (grey := _grey(recording, i)) is not None}
-    if len(frames) < 2:
-        return ()
-    first, turns = min(frames), _turns.setdefault(recording, {})
+    every = np.unique([click.image_time for click in clicks if click.counts]).astype(np.int64)
+    warnings: tuple[DataWarning, ...] = ()
+    for most in (FEW_IMAGES, MOST_IMAGES):  # only if some show a turn are others looked at, to say when
+        times = every[np.unique(np.linspace(0, len(every) - 1, most).round().astype(int))] if len(every) else every
+        turns = _turns_since_the_first(recording, times, camera)
+        warnings = camera_turned(turns, clicks, camera, sigma_px=options.noise.sigma_px)
+        if not warnings:
+            return ()
+    return warnings
+
+
+def _turns_since_the_first(recording: Recording, times: TimesNs, camera: Camera) -> dict[TimeNs, Turn | None]:
+    """Return how the camera turned since the first of some frames, for each that can be read."""
+    indices = {TimeNs(time): int(np.searchsorted(recording.image_times, time)) for time in times.tolist()}
+    frames = {time: grey for time, index in indices.items() if (grey := _grey(recording, index)) is not None}
+    known = _turns.setdefault(recording, {})
+    first = min(frames, default=TimeNs(0))
+    found: dict[TimeNs, Turn | None] = {}
     for time, grey in frames.items():
         key = indices[first], indices[time]
-        if key not in turns:
-            turns[key] = camera_turn(frames[first], grey, camera)
-    found = {time: turns[indices[first], indices[time]] for time in frames}
-    return camera_turned(found, clicks, camera, sigma_px=options.noise.sigma_px)
+        if key not in known:
+            known[key] = camera_turn(frames[first], grey, camera)
+        found[time] = known[key]
+    return found
 
 
 def _grey(recording: Recording, index: int) -> np.ndarray | None:
