@@ -9,7 +9,7 @@ import { hideTip, make, showTip } from "../base/notices.js";
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
 /** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */
 /** @typedef {{label: string, low: number, high: number}} Axis */
-/** @typedef {{marks: Mark[], x: Axis, y: Axis, bar: number, curve: [number, number][], limit: number|null, empty: string}} Content */
+/** @typedef {{marks: Mark[], x: Axis, y: Axis, bar: number, limit: number|null, empty: string}} Content */
 /** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void, line?: (value: number) => void}} Listener */
 /** What is highlighted in all plots. @typedef {{hovered: Set<string>, brushed: Set<string>, selected: string|null}} Highlight */
 
@@ -29,7 +29,7 @@ export class Plot {
   constructor(key, title, listener) {
     this.title = title;
     this.listener = listener;
-    /** @type {Content} */ this.content = { marks: [], x: { label: "", low: 0, high: 1 }, y: { label: "", low: 0, high: 1 }, bar: 0, curve: [], limit: null, empty: "" };
+    /** @type {Content} */ this.content = { marks: [], x: { label: "", low: 0, high: 1 }, y: { label: "", low: 0, high: 1 }, bar: 0, limit: null, empty: "" };
     /** @type {Highlight} */ this.highlight = { hovered: new Set(), brushed: new Set(), selected: null };
     this.at = -1;
     /** Colours of the theme, read once per drawing. @type {Record<string, string>} */ this.colour = {};
@@ -87,7 +87,7 @@ export class Plot {
     this.drawAxes(width, height);
     const marks = [...this.content.marks].sort((a, b) => this.loudness(a) - this.loudness(b)); // what stands out is on top
     for (const mark of marks) this.content.bar ? this.drawBar(mark) : this.drawDot(mark);
-    this.drawCurve();
+    this.drawLimit();
     this.drawPress();
     if (!this.content.marks.length) this.drawEmpty(width, height);
   }
@@ -169,14 +169,9 @@ export class Plot {
     pen.globalAlpha = 1;
   }
 
-  /** The expected distribution, and the limit above which a residual should be checked. */
-  drawCurve() {
+  /** The limit above which a residual should be checked. */
+  drawLimit() {
     const { pen, content } = this;
-    pen.strokeStyle = this.colour.ink;
-    pen.lineWidth = 1.3;
-    pen.beginPath();
-    content.curve.forEach(([x, y], index) => (index ? pen.lineTo(...this.place(x, y)) : pen.moveTo(...this.place(x, y))));
-    pen.stroke();
     if (content.limit === null || content.limit > content.y.high) return;
     pen.setLineDash([4, 3]);
     pen.lineWidth = 1;

@@ -149,7 +149,7 @@ function drawMarks() {
   next.disabled = !open;
   const marks = worst.map((row, index) => ({ ids: [row.click.id], x: index + 0.5, y: row.length, kind: /** @type {Kind} */ (marked.has(row.click.id) ? "outlier" : row.kind), text: told(row) }));
   const high = 1.08 * Math.max(1, ...marks.map((mark) => mark.y));
-  bars.show({ marks, x: { label: "marks; drag the line", low: 0, high: Math.max(1, worst.length) }, y: { label: "residual [px]", low: 0, high }, bar: 1, curve: [], limit: Number.isFinite(line()) ? Math.min(line(), high) : null, empty: EMPTY }, highlight);
+  bars.show({ marks, x: { label: "marks; drag the line", low: 0, high: Math.max(1, worst.length) }, y: { label: "residual [px]", low: 0, high }, bar: 1, limit: Number.isFinite(line()) ? Math.min(line(), high) : null, empty: EMPTY }, highlight);
   drawSheet(worst, marked, highlight);
 }
 
@@ -244,7 +244,7 @@ function scatter(drawn, label, at) {
   const usual = drawn.filter((row) => row.kind === "agreeing").map((row) => Math.abs(row[shown.part]));
   const most = 1.12 * Math.max(1e-3, ...(usual.length ? usual : drawn.map((row) => Math.abs(row[shown.part]))));
   const y = { label: `${shown.part === "length" ? "residual" : `residual ${shown.part}`} [px]`, low: shown.part === "length" ? 0 : -most, high: most };
-  return { marks, x: { label, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, curve: [], limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
+  return { marks, x: { label, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
 }
 
 /** @param {Mark|null} mark */
