@@ -128,8 +128,8 @@ COMMANDS: Mapping[str, Command] = {
             "cocalib.cli.watch:Watch",
             "Watch whether camera or radar has turned since a baseline: by the still image, the still returns, and traffic.",
             (
-                "calibration.json drive.mcap --baseline baseline.json --boxes boxes.json",
-                "calibration.json today.mcap --boxes moving --json",
+                "calibration.json today.mcap --boxes moving",
+                "calibration.json today.mcap --boxes /detections --json",
             ),
         ),
         Command(
