@@ -107,7 +107,7 @@ def take_commands(browser: Browser, sample: Path, made: Path) -> None:
     recording = [sample / "radar.bag", sample / "camera.bag"]
     answer, report, video = made / "calibration.json", made / "report.html", made / "overlay.mp4"
     assert run(["solve", *recording, "--clicks", sample / "clicks.json", "--out", answer]) == 0
-    assert run(["evaluate", answer, *recording, "--report", report, "--require", "max-deg=2", "max-cm=30"]) == 0
+    assert run(["evaluate", answer, *recording, "--report", report, "--require", "max-deg=3", "max-cm=30"]) == 0
     assert run(["show", *recording, "--calibration", answer, "--out", video]) == 0
     page = browser.new_page(viewport={"width": 1100, "height": 1270}, color_scheme="light")
     page.goto(report.as_uri())
