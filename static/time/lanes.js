@@ -138,7 +138,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   pen.font = smallFont(1, "600");
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = themeColour("ink");
-  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
+  pen.fillText(`${state.placements.indexOf(placement) + 1}`, middle, (top + bottom) / 2 + 0.5);
 }
 
 /** @param {Context2D} pen @param {number} left @param {number} right @param {number} y */
