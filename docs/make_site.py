@@ -25,7 +25,7 @@ _PAGES = {
     "Get started": "tour first-steps examples gallery",
     "How to": "radar-formats intrinsics proposals evaluation boxes drift watch fleet report citing rerun simulation",
     "Concepts": "method conventions apex paper reliability security GLOSSARY",
-    "Reference": "commands python formats warnings",
+    "Reference": "commands page python formats warnings",
     "Project": "accuracy paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
