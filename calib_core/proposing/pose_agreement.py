@@ -600,8 +600,11 @@ def _deal(rng: np.random.Generator, n: int) -> Indices:
             return np.asarray(rows)
 
 
+_WIDE_ENOUGH_PX = 16.0
+"""Width of a reflector whose apex can be seen."""
+
 _OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
-"""Share of the places with an apex: of reflectors wide enough to show it 0.92 in simulated recordings, of people 0.1 to 0.4."""
+"""Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
 
 _UPRIGHT_PERSON, _UPRIGHT_REFLECTOR = 0.85, 0.15
 """Share of the places without an apex that are much taller than wide: 23 of 26 people in simulated recordings, and a reflector
@@ -610,26 +613,35 @@ on a stand that is as wide as itself, or one with somebody behind it."""
 _BEFORE = 1.0
 """Log-odds before any image: most recordings contain a reflector."""
 
+_LEAST_SEEN = 3
+"""Fewer places that tell say nothing."""
+
 _PRESENT = 0.5
 
 
-def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
-    """Return the log-odds that what stood there is a reflector and not a person: an apex speaks for it, its lack not
-    against it; infinite where nothing is told.
+def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement, *, by_shape: bool = False) -> float:
+    """Return the log-odds that what stood there is a reflector and not a person; infinite where too little is told.
+
+    A place that is wide enough to show an apex and shows none speaks against it, unless the thing is not upright, as a board
+    around small sheets.
 
     Args:
         views: as the agreement was found for, without confirmed clicks.
         agreement: its most probable candidates are looked at.
+        by_shape: whether what is too small for an apex is told by its shape alone: a reflector on a tripod is upright, too.
     """
-    log_odds, told = _BEFORE, False
+    log_odds, count = _BEFORE, 0
     for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
         if probability[row] < _PRESENT:
             continue
         candidate = view.candidates[row]
-        upright = is_upright(view, candidate.pixel_px)
-        told |= candidate.has_apex or upright is not None
-        if candidate.has_apex:
-            log_odds += float(np.log(_OF_REFLECTOR / _OF_OTHERS))
-        elif upright is not None:
-            log_odds += float(np.log(_UPRIGHT_REFLECTOR / _UPRIGHT_PERSON)) * (1.0 if upright else -1.0)
-    return log_odds if told else float("inf")
+        wide = view.width_px >= _WIDE_ENOUGH_PX
+        upright = None if candidate.has_apex else is_upright(view, candidate.pixel_px)
+        if wide:
+            shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
+            seen = shares if candidate.has_apex else 1.0 - shares
+            log_odds += float(np.log(seen[0] / seen[1]))
+        if upright is False or (upright and by_shape and not wide):
+            log_odds += float(np.log(_UPRIGHT_PERSON / _UPRIGHT_REFLECTOR)) * (-1.0 if upright else 1.0)
+        count += wide or (by_shape and upright is not None)
+    return log_odds if count >= _LEAST_SEEN else float("inf")

@@ -54,6 +54,7 @@ _TWO_PLACES = "two spots are about as likely"
 _TAKEN = "the only likely spot is another reflector's"
 _FEW = "too few placements to compare"
 _TWO_POSES = "another mounting fits nearly as well"
+_CHANCE = "chance would do nearly as well; a click will tell"
 _UNLIKELY = "what changed does not look like the reflector"
 
 
@@ -177,9 +178,10 @@ class _Judged:
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None:
             above = (agreement.score - (_CHANCE_SCORE if by_clicks is None else _CHANCE_AFTER_CLICK)) / _CHANCE_STEP
-            trusted = agreement.pose_probability * max(_logistic(above), by_deals)
+            by_score = _logistic(above)
+            trusted = agreement.pose_probability * max(by_score, by_deals)
             if by_clicks is None:
-                reflectors = _logistic(reflector_log_odds(views, agreement))
+                reflectors = _logistic(reflector_log_odds(views, agreement, by_shape=by_deals > by_score))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:
@@ -227,7 +229,11 @@ class _Judged:
         ranked = np.sort(self.agreement.probability[i])[::-1]
         if len(ranked) > 1 and ranked[1] > 0.5 * ranked[0]:
             return _TWO_PLACES
-        return _TWO_POSES if self.trusted < _WEAK else _UNLIKELY
+        return _UNLIKELY if self.trusted >= _WEAK else self._of_pose()
+
+    def _of_pose(self) -> str:
+        certain = self.agreement is not None and self.agreement.pose_probability >= _WEAK
+        return _CHANCE if certain else _TWO_POSES
 
     def _without_pose(self) -> str:
         if (self.rays.click >= 0).any():
