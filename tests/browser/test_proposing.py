@@ -177,6 +177,7 @@ def enter_does_nothing_else(page: Driver) -> None:
     page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
     page.press("Enter")
     assert page.value("__cocalib.state.cross") is None
+    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
     page.press("g")
     page.until("__cocalib.state.cross")
 
@@ -242,6 +243,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     page.until("!document.getElementById('guide').textContent.includes('sure')")
     page.press("Enter")
     assert page.value("__cocalib.state.cross") is None
+    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
     page.press("g")
     page.until("__cocalib.state.cross")
     assert page.view["clicks"] == []

@@ -46,6 +46,7 @@ _OUTPUTS = {
         ".mcap",
         "made.mcap/made.mcap.mcap",
     ),
+    "watch.update": ("watch calibration.json made.mcap --update {}", ".json", "calibration.json"),
     "import.out": ("import pose.urdf --camera camera.yaml --out {}", ".json", "camera.yaml"),
     "import.sheet": (
         "import pose.txt --recording made.mcap --camera camera.yaml --out o.json --sheet {}",
@@ -64,7 +65,7 @@ _OUTPUTS = {
 """A command for each output: how it is typed, the suffix, and a file that it reads."""
 _FOLDERS = {"batch.out", "simulate.out", "export.out", "intrinsics.rectified"}
 _UNSOLVED = {
-    *("solve.clicks_out", "solve.out, proposals"),
+    *("solve.clicks_out", "solve.out, proposals", "watch.update"),
     *("intrinsics.out, board", "intrinsics.views", "intrinsics.report"),
 }
 """Nothing comes of grey images that could be written; what may be written is told before."""

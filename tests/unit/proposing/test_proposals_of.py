@@ -337,8 +337,9 @@ def _with_upright_thing(view: DwellView, pixel_px: np.ndarray) -> DwellView:
 
 
 def test_the_width_is_found_far_beyond_chance_where_images_and_radar_belong_together():
-    own = common_width(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
-    other = common_width(with_images_of(draw_views(4), draw_views(24)), CAMERA, OPTIONS)
+    few = Drawing(count=6)
+    own = common_width(draw_views(4, few).views, CAMERA, OPTIONS)
+    other = common_width(with_images_of(draw_views(4, few), draw_views(24, few)), CAMERA, OPTIONS)
     assert own.probability > 0.9
     assert other.probability < 0.5
     assert own.score > max(own.by_chance.max(), other.score) + 5.0
