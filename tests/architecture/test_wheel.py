@@ -278,7 +278,8 @@ def prepare(folder: Path, run: Callable[[str], object]) -> None:
     run("cocalib open drive.mcap --clicks clicks.json")
     for name in ("old", "new", "factory", "a", "b"):
         shutil.copy(folder / "calibration.json", folder / f"{name}.json")
-    shutil.copy(folder / "drive.mcap", folder / "other.mcap")
+    for name in ("other", "first", "today"):
+        shutil.copy(folder / "drive.mcap", folder / f"{name}.mcap")
     shutil.move(folder / "csv" / "recording_csv", folder / "tables")
     (folder / "tables" / "radar.csv").write_text(radar_table(folder / "tables" / "radar.csv"))
     kit = (folder / "kit.yaml").read_text().replace("camera_link", "camera0/camera_link")
