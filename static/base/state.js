@@ -179,6 +179,23 @@ export function nameOf(id) {
   return names.get(id) ?? id;
 }
 
+/** Whether a recording has many minutes: its times are minutes then. @param {number} last its last second */
+export const isLong = (last) => last >= 600;
+
+/** A time of the recording, as the ruler says it. @param {number} seconds @param {number} digits */
+export function timeText(seconds, digits) {
+  return isLong(state.seconds.at(-1) ?? 0) ? minutesText(seconds, digits) : `${seconds.toFixed(digits)} s`;
+}
+
+/** @param {number} seconds @param {number} digits */
+export function minutesText(seconds, digits) {
+  const unit = 10 ** digits;
+  const parts = Math.floor(seconds * unit + 1e-6);
+  const [hours, minutes] = [Math.floor(parts / unit / 3600), Math.floor(parts / unit / 60) % 60];
+  const rest = ((parts % (60 * unit)) / unit).toFixed(digits).padStart(digits ? digits + 3 : 2, "0");
+  return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest}` : `${minutes}:${rest}`;
+}
+
 /** What a click is called within a sentence. @param {string} id */
 export const called = (id) => (nameOf(id) === id ? id : `#${nameOf(id)}`);
 

@@ -4,7 +4,7 @@
  */
 
 import { icon, make } from "../base/notices.js";
-import { on, onPainted, state } from "../base/state.js";
+import { on, onPainted, state, timeText } from "../base/state.js";
 import { toDevice, viewport, zoom } from "../image/geometry.js";
 import { fit } from "../image/image.js";
 import { searchWords } from "../proposals/proposals.js";
@@ -89,7 +89,7 @@ function followWords() {
 
 function drawClock() {
   const index = state.shown?.index ?? state.cursor;
-  get("clock-time").textContent = (state.seconds[index] ?? 0).toFixed(3);
+  get("clock-time").textContent = timeText(state.seconds[index] ?? 0, 3);
   get("clock-frame").textContent = state.seconds.length ? `${index + 1} / ${state.seconds.length}` : "";
 }
 

@@ -4,7 +4,7 @@ import { register, withImages } from "../base/actions.js";
 import { LARGE_PX, residualColour } from "../base/colours.js";
 import { showPage } from "../base/layout.js";
 import { make, shape } from "../base/notices.js";
-import { clickIn, clicks, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
+import { clickIn, clicks, nameOf, onPainted, select, stampKey, state, timeText } from "../base/state.js";
 import { withSelected } from "../image/actions.js";
 import { comeTo } from "../image/arriving.js";
 import { candidatesOf, choose } from "../image/candidates.js";
@@ -215,7 +215,7 @@ function line(click) {
   const range = click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`;
   const row = make("tr", `row ${click.state}`, [
     make("td", "", [make("span", "name", [glyph(click.state, colour), nameOf(click.id)])]),
-    make("td", "", `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`),
+    make("td", "", timeText(state.seconds[click.frame] ?? 0, 2)),
     make("td", "", range),
     make("td", "bar", [make("span", "meter", [make("i", "", [bar]), make("span", "", residual)])]),
     make("td", "", [act]),

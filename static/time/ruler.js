@@ -4,6 +4,7 @@
  */
 
 import { smallFont, smallPx, themeColour } from "../base/colours.js";
+import { isLong, minutesText } from "../base/state.js";
 
 /** @typedef {CanvasRenderingContext2D} Context2D */
 /** @typedef {import("./lanes.js").Axis} Axis */
@@ -30,7 +31,7 @@ export function drawRuler(pen, left, width, height, axis) {
     for (let tick = Math.ceil(begin / step); tick * step <= end; tick += 1) ticks.push(tick * step);
     for (const seconds of [...starts, ...ticks]) {
       const x = axis.toX(seconds);
-      const words = timeWords(seconds, step, lastOf(axis) >= 600);
+      const words = timeWords(seconds, step, isLong(lastOf(axis)));
       const half = pen.measureText(words).width / 2;
       pen.fillStyle = themeColour("line");
       pen.fillRect(Math.round(x), RULER - 3, 1, height - RULER + 3);
@@ -54,11 +55,7 @@ const lastOf = ({ folding: { stretches } }) => stretches[stretches.length - 1].t
 
 /** @param {number} seconds @param {number} step [s] @param {boolean} long whether the recording has many minutes */
 function timeWords(seconds, step, long) {
-  if (long && step >= 1) {
-    const [hours, minutes, rest] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60, Math.floor(seconds % 60)];
-    const two = (/** @type {number} */ value) => String(value).padStart(2, "0");
-    return hours ? `${hours}:${two(minutes)}:${two(rest)}` : `${minutes}:${two(rest)}`;
-  }
+  if (long && step >= 1) return minutesText(seconds, 0);
   if (seconds === 0) return "0 s";
   return step < 1 ? seconds.toFixed(Math.ceil(-Math.log10(step))) : String(Math.round(seconds));
 }

@@ -118,3 +118,14 @@ def test_the_folded_axis_is_monotone_and_has_an_exact_way_back(islands_page: Dri
             assert not inside.any()  # no frame is in a folded gap
         if not answer["gaps"]:
             assert np.allclose(drawn - drawn[0], asked_s - asked_s[0])  # nothing to fold: the axis is time itself
+
+
+def test_times_of_a_long_recording_are_minutes_and_hours(page: Driver) -> None:
+    texts = page.page.evaluate(
+        """async () => {
+          const { minutesText } = await import("/base/state.js");
+          return [[59.999, 0], [600, 0], [3002.446, 3], [3852.3, 2]].map(([seconds, digits]) => minutesText(seconds, digits));
+        }"""
+    )
+    assert texts == ["0:59", "10:00", "50:02.446", "1:04:12.30"]
+    assert page.text("#clock-time").endswith(" s")
