@@ -70,8 +70,8 @@ def find_proposals(
     Raises:
         CalibrationError: the recording cannot be read.
     """
-    if camera is None:
-        return Unsolvable("no-camera")
+    if camera is None or not len(recording.image_times):
+        return Unsolvable("no-camera" if camera is None else "no-frames")
     if placements is None:
         if progress is not None:
             progress("searching the radar scans for placements")
@@ -205,8 +205,6 @@ def _placements(recording: RecordedFrames, gating: GatingOptions, stopped: Calla
 
 def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unsolvable | None:
     """Say why there can be no proposals; None if there can."""
-    if not len(recording.image_times):
-        return Unsolvable("no-frames")
     if len(placements) < _LEAST_PLACEMENTS:
         return Unsolvable("too-few-placements", {"placements": len(placements), "needed": _LEAST_PLACEMENTS})
     times = recording.image_times

@@ -306,6 +306,9 @@ class _Grid:
         snr_db: (n,) NaN where unknown.
         key: (n,) as of `return_keys`.
         listed_first: (n,) as of `first_rows`.
+        first_keys: (l,) ascending, of the returns with alternatives that are listed first.
+        first_points_radar_m: (l, 3) where these are.
+        in_pieces: the scans stop for a while, as between bags.
         cell: (3,) size of a cell.
         reach: (3,) of a dwell's returns about their median.
     """
@@ -321,6 +324,9 @@ class _Grid:
     snr_db: Values
     key: Indices
     listed_first: Flags
+    first_keys: Indices
+    first_points_radar_m: Points3
+    in_pieces: bool
     cell: Vector3
     reach: Vector3
 
@@ -334,8 +340,12 @@ class _Grid:
         order = np.argsort(keys, kind="stable")
         unique, first = np.unique(keys[order], return_index=True)
         start_ns = static.times_ns[0] if len(static) else 0
+        times_s = (static.times_ns - start_ns) / NS_PER_S
+        listed_first = first_rows(keys_of_returns)
+        firsts = np.flatnonzero(listed_first & (keys_of_returns >= 0))
+        firsts = firsts[np.argsort(keys_of_returns[firsts])]
         return cls(
-            times_s=(static.times_ns - start_ns) / NS_PER_S,
+            times_s=times_s,
             times_ns=static.times_ns,
             cells=cells[order][first],
             keys=unique,
@@ -345,7 +355,10 @@ class _Grid:
             points_radar_m=static.points_radar_m[order],
             snr_db=static.snr_db[order],
             key=keys_of_returns[order],
-            listed_first=first_rows(keys_of_returns)[order],
+            listed_first=listed_first[order],
+            first_keys=keys_of_returns[firsts],
+            first_points_radar_m=static.points_radar_m[firsts],
+            in_pieces=bool((np.diff(times_s) > _BETWEEN_PIECES_S).any()),
             cell=CELL * growth,
             reach=_REACH * growth,
         )
@@ -454,14 +467,13 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
     as_strong = members[~(grid.snr_db[members] < strong_db - _WEAKER_DB)]
     shown = np.unique(grid.scan[as_strong])
     presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
-    in_pieces = bool((np.diff(grid.times_s) > _BETWEEN_PIECES_S).any())
-    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1] and not in_pieces
+    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1] and not grid.in_pieces
     if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
         return None
     position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
     range_m = float(np.linalg.norm(position_radar_m))
     keys = np.unique(grid.key[mine][grid.key[mine] >= 0])
-    first_listed = grid.listed_first & np.isin(grid.key, keys)
+    first_listed = grid.first_points_radar_m[np.searchsorted(grid.first_keys, keys)]
     return Dwell(
         start=TimeNs(int(grid.times_ns[span[0]])),
         end=TimeNs(int(grid.times_ns[span[1]])),
@@ -475,7 +487,7 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
         keys=keys,
         listed_first=float(grid.listed_first[mine].mean()),
-        first_listed_radar_m=np.median(grid.points_radar_m[first_listed], axis=0) if len(keys) else position_radar_m,
+        first_listed_radar_m=np.median(first_listed, axis=0) if len(keys) else position_radar_m,
     )
 
 
