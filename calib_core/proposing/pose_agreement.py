@@ -632,16 +632,16 @@ def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement, *, 
     """
     log_odds, count = _BEFORE, 0
     for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
-        if probability[row] < _PRESENT:
+        wide = view.width_px >= _WIDE_ENOUGH_PX
+        if probability[row] < _PRESENT or not (wide or by_shape):
             continue
         candidate = view.candidates[row]
-        wide = view.width_px >= _WIDE_ENOUGH_PX
         upright = None if candidate.has_apex else is_upright(view, candidate.pixel_px)
         if wide:
             shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
             seen = shares if candidate.has_apex else 1.0 - shares
             log_odds += float(np.log(seen[0] / seen[1]))
-        if upright is False or (upright and by_shape and not wide):
+        if upright is False or (upright and not wide):
             log_odds += float(np.log(_UPRIGHT_PERSON / _UPRIGHT_REFLECTOR)) * (-1.0 if upright else 1.0)
-        count += wide or (by_shape and upright is not None)
+        count += wide or upright is not None
     return log_odds if count >= _LEAST_SEEN else float("inf")
