@@ -17,6 +17,7 @@ from pathlib import Path
 
 import calib_core
 from cocalib.cli.commands import COMMANDS
+from cocalib.cli.exit_codes import exit_codes
 from cocalib.cli.help import named_options_help, short_help
 
 _ROOT = Path(__file__).parent.parent
@@ -46,6 +47,7 @@ def _commands() -> Iterator[str]:
     yield "# Commands\n\n`--help all` after a command lists every option; options by name are at the end.\n"
     for command in COMMANDS.values():
         yield f"## {command.name}\n\n```text\n{short_help(command)}```\n"
+    yield f"## Exit codes\n\n{exit_codes().removeprefix('Exit codes. ')}\n"
     yield f"## Options by name\n\n```text\n{named_options_help(COMMANDS['solve'].load())}```\n"
 
 

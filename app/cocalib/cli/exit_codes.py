@@ -1,4 +1,4 @@
-"""The law of exit codes: its words, for help and README, and what counts as in doubt."""
+"""The law of exit codes: its words, for help and site, and what counts as in doubt."""
 
 from typing import TYPE_CHECKING, Final, Literal
 
