@@ -45,7 +45,7 @@ class LocatingOptions:
     """How the returns around one click become candidates."""
 
     window_s: float = option(
-        3.0, "Length of the window centred on the scan nearest to the click [s] (paper: 3 s).", low=0.01, high=60.0
+        3.0, "Length of the window centered on the scan nearest to the click [s] (paper: 3 s).", low=0.01, high=60.0
     )
     max_candidates: int = option(
         16, "Largest number of candidates per click; fewer are kept where one return stands out.", low=1, high=50
@@ -164,7 +164,7 @@ class ReflectorOptions:
 
     offset_sigma_m: float = option(
         0.02,
-        "Standard deviation of the clicked point from the radar's phase centre, per camera axis [m]; a mouth is 0.1 m off.",
+        "Standard deviation of the clicked point from the radar's phase center, per camera axis [m]; a mouth is 0.1 m off.",
         low=0.0,
         high=1.0,
     )
@@ -187,7 +187,7 @@ class CameraPositionPrior:
     """A tape-measured camera position; no other extra measurement helps as much. It may be off by more than its sigma says."""
 
     position_m: tuple[float, float, float] = option(
-        (0.0, 0.0, 0.0), "Camera centre in the radar frame: forward, left, up [m].", low=-100.0, high=100.0
+        (0.0, 0.0, 0.0), "Camera center in the radar frame: forward, left, up [m].", low=-100.0, high=100.0
     )
     sigma_m: float = option(0.03, "Standard deviation of that position, per axis [m].", low=1e-4, high=10.0)
 
@@ -239,9 +239,9 @@ class PaperOptions:
     )
     window: Literal["centred", "whole-second"] = option(
         "centred",
-        "Centred on the nearest stamp as in the paper, or as the authors do: 1 s on either side of that stamp's whole second.",
+        "Centered on the nearest stamp as in the paper, or as the authors do: 1 s on either side of that stamp's whole second.",
     )
-    window_s: float = option(3.0, "Length of the centred window [s].", low=0.01, high=60.0)
+    window_s: float = option(3.0, "Length of the centered window [s].", low=0.01, high=60.0)
     region_m: float = option(
         1.0,
         "Placement range [m]: returns farther from the placement are left out before the z-score; 0: none, as printed.",
@@ -473,12 +473,12 @@ def _unit_after(path: str) -> str:
 
 
 def _other_units(name: str, number: float) -> str:
-    """Say what a length that is out of range would be if it was given in centimetres or millimetres; "" if it is no such."""
+    """Say what a length that is out of range would be if it was given in centimeters or millimeters; "" if it is no such."""
     low, high = RANGES[name]
     if unit_of_name(name) != "m" or number <= high or not low <= number / 1000 <= high:
         return ""
     metres = f" or {number / 100:g}" if number / 100 <= high else ""
-    return f". Give metres: {number / 1000:g}{metres}, if it is in millimetres{' or centimetres' if metres else ''}"
+    return f". Give meters: {number / 1000:g}{metres}, if it is in millimeters{' or centimeters' if metres else ''}"
 
 
 RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())

@@ -67,7 +67,7 @@ def _table(decoders: list[Decoder]) -> list[str]:
         "|" + "---|" * 8,
     ]
     rows += ["| " + " | ".join(_cells(decoder)) + " |" for decoder in decoders]
-    return [*rows, "", "Recognised by:", "", *(f"* {d.name}: `{' '.join(d.fields)}`" for d in decoders)]
+    return [*rows, "", "Recognized by:", "", *(f"* {d.name}: `{' '.join(d.fields)}`" for d in decoders)]
 
 
 def _cells(decoder: Decoder) -> tuple[str, ...]:

@@ -970,7 +970,7 @@ export interface IntrinsicsChosen {
   request?: number;
 }
 
-/** The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel. */
+/** The reflector's center in one frame; pixel (0, 0) is the center of the top-left pixel. */
 export interface ClickDocument {
   id: string;
   image_time: Stamp;

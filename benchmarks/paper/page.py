@@ -44,13 +44,13 @@ def read_measured() -> Measured:
 
 
 def table(measured: Measured) -> str:
-    """Return Table I: the paper's figures, ours of both sets of seeds, and the judgement of both."""
+    """Return Table I: the paper's figures, ours of both sets of seeds, and the judgment of both."""
     rows = []
     for name, (aed, cdsd) in PAPER.items():
         both = [judged(name, seeds) for seeds in measured.sets]
         ours = ["<br>".join(_spread(one[i]) for one in both) for i in range(2)]
         rows.append([name, f"{aed:.2f} / {cdsd:.2f}", *ours, verdict(name, measured.sets)])
-    return _table(["row", "paper: AED / CDSD", "our AED", "our CDSD", "judgement"], rows)
+    return _table(["row", "paper: AED / CDSD", "our AED", "our CDSD", "judgment"], rows)
 
 
 def page(measured: Measured, settings: Settings, fit: Fit) -> str:
@@ -78,13 +78,13 @@ log-normal distribution fitted to them, the first set above the second. AED and 
 {table(measured)}
 
 A figure is *reproduced* if the paper's value lies in our range and our median is within 25 % of it; *compatible* if it lies in our range, but that range is
-wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgement of {18 - len(differing(*measured.sets))} of 18 figures. The others:
+wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgment of {18 - len(differing(*measured.sets))} of 18 figures. The others:
 
 {differ}
 
 PPM+D1, PPM+D2 and CCM+D2 were fitted, so that they agree is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn for each seed; that
 is why they are ranges. They rest on the size of the image too: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be
-{_with_focal_length(measured.sets, _SCRIPT_FOCAL_PX, settings)} without fitting again, and the judgement would turn to not reproduced.
+{_with_focal_length(measured.sets, _SCRIPT_FOCAL_PX, settings)} without fitting again, and the judgment would turn to not reproduced.
 PPM+DR+D3 follows from gross errors that were chosen for it.
 
 The other three were not fitted, but none is a blind prediction. PPM+D3 depends on `outshone_share` (see below), which was chosen after a first look at D3.
@@ -135,7 +135,7 @@ These are assumptions, the same for all rows:
 |---|---|---|---|
 | constant errors | azimuth {settings.constant_azimuth_deg:g} deg, elevation {settings.constant_elevation_deg:g} deg | fitted, see above | PPM, CCM |
 | board | {settings.board_corners} of 8 x 5 corners 0.30 m apart, 6.5 m away: {_board_px(settings):.0f} px between the outermost columns | the number was fitted; size and range are the preset's. The paper does not say which board was used; that of its intrinsics, 9 x 6 squares of 22.14 mm, is 0.2 m wide | CCM, PPM+D2 |
-| image | {settings.width_px} x {settings.width_px * 9 // 16} px, 75 deg wide | that of our other studies. The intrinsics in the authors' published script (554 px, centre at 299, 265) are of an image of about 640 x 480 | PMM; not PPM, where errors in px are what is fitted |
+| image | {settings.width_px} x {settings.width_px * 9 // 16} px, 75 deg wide | that of our other studies. The intrinsics in the authors' published script (554 px, center at 299, 265) are of an image of about 640 x 480 | PMM; not PPM, where errors in px are what is fitted |
 | lens distortion | k1 = -0.17, k2 = 0.032, known to the calibration | the simulator's typical lens | CCM+D1, whose points lie far outside the image, where this polynomial grows with the fifth power; the others hardly |
 | mounting error | {settings.mounting_error_deg:g} deg per axis, and 1 cm per axis off the tape | that of our other studies | PMM |
 | placements | {settings.placements} on the ground | none: chosen instead of 20 after a first look at the rows of an earlier version | PPM+D1+T_m |

@@ -2,7 +2,7 @@
 
 An array's calibration error changes slowly with direction, is stable for years, and cannot be removed by a rigid
 transform. The residuals of a calibration show it: the direction of the click minus the direction measured by the radar, at
-the radar's range. Each of the two angles is modelled as a Gaussian process over direction,
+the radar's range. Each of the two angles is modeled as a Gaussian process over direction,
 
     y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (7)
 
@@ -24,7 +24,7 @@ from calib_core.results import Calibration, PairResult
 
 _LEAST_PAIRS = 8
 _MOST_PAIRS = 120
-"""Beyond this many the pairs are thinned out, because neighbours are redundant."""
+"""Beyond this many the pairs are thinned out, because neighbors are redundant."""
 
 _LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
 _SMOOTH_RAD = np.deg2rad([0.0, 0.2, 0.4, 0.8, 1.6, 3.2])
@@ -43,7 +43,7 @@ _MOST_OFF_RAD = np.deg2rad(15.0)
 def learn_angle_map(calibration: Calibration) -> AngleMap | None:
     """Learn the radar's smooth angle errors from the inlier pairs of a calibration.
 
-    None if they cannot be learnt: fewer than eight pairs, or a pose without a noise model (the paper's method).
+    None if they cannot be learned: fewer than eight pairs, or a pose without a noise model (the paper's method).
 
     Args:
         calibration: of the default method.

@@ -13,7 +13,7 @@ a prior is no cause. A test takes one step from the optimum and needs no second 
 new cause is one shape or one quantity more.
 
 A wrong principal point cannot be detected: the rotation absorbs it. A radar without elevation is not tested: its own residuals
-grow towards the near placements.
+grow toward the near placements.
 """
 
 import re
@@ -34,12 +34,12 @@ _LEAST_PAIRS = 10
 _LEAST_LEFT = 0.05  # share of the residual's degrees of freedom that must stay unexplained
 _SMOOTH_RAD = np.deg2rad(14.0)
 _SMOOTH_VARIANCE, _SMOOTH_VARIANCE_OF_STEPS = 0.25, 4.0
-"""Of angle errors that neighbouring placements share, over the noise's. Steps are tested against twice the noise: placements that
+"""Of angle errors that neighboring placements share, over the noise's. Steps are tested against twice the noise: placements that
 walk across the view turn one into the other."""
 _SHARES = {"turn": 0.3, "move": 0.05, "range step": 0.05, "stated": 0.3, "other": 0.3}
 """Of the level: of steps by their kind, of what has a prior, and of everything else."""
 _MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # tried; on each side
-_DIFFERENT = 0.25  # of the tests of a kind count: neighbouring shapes and splits are nearly the same
+_DIFFERENT = 0.25  # of the tests of a kind count: neighboring shapes and splits are nearly the same
 _COST = 2.0  # of the statistic, for each unknown of a cause (Akaike)
 _BESIDE = 6.0  # fall of the statistic up to which another cause is not told apart: a likelihood ratio of 20
 

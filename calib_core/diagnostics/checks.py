@@ -32,7 +32,7 @@ _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
-_MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
+_MANY_PLACES = 500  # of more, neighbors come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers")
 _TOLD_BY_MORE = (
     "handedness-assumed",

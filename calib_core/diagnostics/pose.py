@@ -113,7 +113,7 @@ def _cost_without_prior(fit: SolvedFit, other: GncSolution) -> float:
 
 
 def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
-    """Return the distance between the camera centres of the solved pose and another."""
+    """Return the distance between the camera centers of the solved pose and another."""
     here, there = _camera_centre(fit.refined.camera_from_radar), _camera_centre(other.camera_from_radar)
     return float(np.linalg.norm(here - there))
 

@@ -51,7 +51,7 @@ def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int
 
     Args:
         calibration: of any method; without a covariance the map is NaN.
-        distance_m: from the camera's centre, along the ray.
+        distance_m: from the camera's center, along the ray.
         columns: of the grid; rows follow from the shape of the image.
     """
     camera = calibration.camera

@@ -31,7 +31,7 @@ AXES: dict[Axis, tuple[float, float, float]] = {
 """The camera's own axes: x right, y down, z forward."""
 
 _MOST_DEG = 16.0
-_STEPS_DEG = (2.0, 1.0, 0.5, 0.25)  # towards the top of a curve, once it is inside
+_STEPS_DEG = (2.0, 1.0, 0.5, 0.25)  # toward the top of a curve, once it is inside
 _LOW = 0.25  # Acc in all of a curve says nothing of where its top is
 _NORMAL_95 = 1.96
 _CHANCE_DEG = 10.0
@@ -118,7 +118,7 @@ def seen_pixels(points_camera_m: Points3, camera: Camera) -> Points2:
 
 
 def frame_groups(image_times: TimesNs, length_s: float) -> Indices:
-    """Number the groups of neighbouring frames (f,): those of one interval of this length since the first frame."""
+    """Number the groups of neighboring frames (f,): those of one interval of this length since the first frame."""
     if not len(image_times):
         return np.zeros(0, dtype=np.int64)
     return np.unique((image_times - image_times[0]) // round(length_s * NS_PER_S), return_inverse=True)[1]
@@ -127,7 +127,7 @@ def frame_groups(image_times: TimesNs, length_s: float) -> Indices:
 def grouped_error(values: Values, image_times: TimesNs) -> tuple[float, int]:
     """Return the standard error of the mean of one value per frame, and the number of independent groups of frames.
 
-    Neighbouring frames show the same targets, so they are taken together: the largest of the errors with groups of 1, 2, 5
+    Neighboring frames show the same targets, so they are taken together: the largest of the errors with groups of 1, 2, 5
     and 10 s that leave enough groups. As many groups count as the longest of these leave, whatever the values. NaN below two.
 
     Args:
@@ -208,7 +208,7 @@ class _Curve:
         return max(self.shares, key=lambda angle: (self.acc(angle), -abs(angle)))
 
     def search(self) -> None:
-        """Widen the angles until the top is inside, or at most 16 deg away, and then step towards it."""
+        """Widen the angles until the top is inside, or at most 16 deg away, and then step toward it."""
         reach_deg = max(map(self._known, ANGLES_DEG))
         while reach_deg < _MOST_DEG:
             top = self.top_deg

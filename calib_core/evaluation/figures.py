@@ -232,7 +232,7 @@ class BoxFigures:
 
     Attributes:
         acc: mean over the frames with returns, frames of 0 % kept, 0 to 1; None if no frame counts.
-        acc_standard_error: of that mean, with neighbouring frames taken together; NaN below two groups.
+        acc_standard_error: of that mean, with neighboring frames taken together; NaN below two groups.
         acc_without_zero_frames: the same without the frames of 0 %, as the authors' script computes it; None likewise.
         frames: one per frame that has boxes or returns of targets, in order of time.
         classes: by label.
@@ -241,7 +241,7 @@ class BoxFigures:
         chance: mean Acc of the calibration turned by 10 deg to each side; None if acc is.
         rule: which returns count and how they were matched, in one sentence.
         source: of the boxes.
-        groups: number of groups of neighbouring frames that the standard error comes from.
+        groups: number of groups of neighboring frames that the standard error comes from.
         area_chance: mean share of the image that a target's box covers: what returns at random pixels would score.
         targets: number of targets that were found.
         matched_targets: number of them that have boxes.

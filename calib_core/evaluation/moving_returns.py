@@ -29,7 +29,7 @@ class TargetOptions:
         "auto", "Whether the sensors stood still or moved; auto finds out from the returns' Doppler speeds."
     )
     spacing_m: float = option(
-        0.4, "Distance between neighbouring returns of one target, noise apart [m].", low=0.01, high=10.0
+        0.4, "Distance between neighboring returns of one target, noise apart [m].", low=0.01, high=10.0
     )
     sigma_range_m: float = option(
         0.1, "Standard deviation of a return's range where the message gives none [m].", low=1e-3, high=10.0

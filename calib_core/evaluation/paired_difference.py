@@ -27,7 +27,7 @@ class PairedDifference:
         low: lower end of the 95 % interval of the mean (Student's t); NaN likewise.
         high: its upper end.
         p_value: probability of a mean this far from 0 if neither were better; NaN likewise.
-        groups: number of placements, or of groups of neighbouring frames.
+        groups: number of placements, or of groups of neighboring frames.
         winner: which one is better.
     """
 
@@ -57,7 +57,7 @@ def residual_difference(a: ResidualFigures, b: ResidualFigures, *, lost_px: floa
 
 
 def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
-    """Compare Acc, B's minus A's, frame by frame with neighbouring frames taken together; None if no frame counts.
+    """Compare Acc, B's minus A's, frame by frame with neighboring frames taken together; None if no frame counts.
 
     Args:
         a: of one calibration.

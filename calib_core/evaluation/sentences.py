@@ -53,7 +53,7 @@ def acc_sentence(figures: BoxFigures) -> str:
 
 
 def _noun(figures: BoxFigures) -> str:
-    return "labelled object" if figures.by_cuboid else "moving target"
+    return "labeled object" if figures.by_cuboid else "moving target"
 
 
 def sensitivity_sentences(figures: BoxFigures) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from calib_core.evaluation.moving_returns import MovingReturns, TargetOptions, m
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import cartesian_jacobian, polar_from_cartesian
 
-_REACH = 3.0  # standard deviations between two neighbouring returns of one target
+_REACH = 3.0  # standard deviations between two neighboring returns of one target
 _RETURNS_AT_ONCE = 20_000
 _SCANS_APART = 4.0  # reaches between two scans, laid out along a fourth axis
 
@@ -46,7 +46,7 @@ class TargetClusters:
 
 
 def target_clusters(scans: RadarScans, options: TargetOptions) -> TargetClusters:
-    """Group the returns of each scan: two belong together if a chain of neighbours connects them.
+    """Group the returns of each scan: two belong together if a chain of neighbors connects them.
 
     Args:
         scans: moving returns only.

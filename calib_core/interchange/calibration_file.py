@@ -294,10 +294,10 @@ class CalibrationFile:
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:
-    """Choose the inlier's true position, rounded to a millimetre, that projects nearest to the image centre.
+    """Choose the inlier's true position, rounded to a millimeter, that projects nearest to the image center.
 
     The plain transform applies to it, because the radar's errors are taken out. If no inlier is in the image, use a point ten
-    metres along a ray off the centre. None if the lens images neither.
+    meters along a ray off the center. None if the lens images neither.
     """
     camera = calibration.camera
     centre_px = np.array([camera.width_px - 1, camera.height_px - 1]) / 2

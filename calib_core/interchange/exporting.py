@@ -345,7 +345,7 @@ def parent_pose(numbers: Sequence[float]) -> RigidTransform:
     """
     if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
         raise InputError(
-            f"the pose of the radar in its parent takes seven finite numbers: {_NAMES} (metres, quaternion)"
+            f"the pose of the radar in its parent takes seven finite numbers: {_NAMES} (meters, quaternion)"
         )
     try:
         pose = WrittenPose("quaternion_xyzw", np.array(numbers[3:]), np.array(numbers[:3]), "camera_from_radar")

@@ -49,7 +49,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
     frames = file.frames
     lines = [
         f"{EQUATION} with radar frame {quoted(frames.radar)} (x forward, y left, z up), "
-        f"camera frame {quoted(frames.camera)} (optical: x right, y down, z forward), metres; {meaning}",
+        f"camera frame {quoted(frames.camera)} (optical: x right, y down, z forward), meters; {meaning}",
     ]
     check = file.check_point
     if check is not None:

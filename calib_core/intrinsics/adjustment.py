@@ -63,7 +63,7 @@ def reduced(at: Linearized) -> Reduced:
 
 
 def adjust(state: LensState, stack: ViewStack, freedom: Freedom, *, steps: int = _STEPS) -> LensState:
-    """Return the state that minimises the weighted squares, from a start nearby.
+    """Return the state that minimizes the weighted squares, from a start nearby.
 
     Args:
         state: the start.
@@ -317,7 +317,7 @@ def shared_covariance(at: Reduced) -> SharedCovariance:
     """Estimate the covariance from how much the views contradict each other, not from how much their corners do.
 
     Errors of corners in one view belong together: blur, light, motion under a rolling shutter and the detector shift
-    neighbours alike, so that counting corners would state too little. Views are independent. Their scores g_v give the
+    neighbors alike, so that counting corners would state too little. Views are independent. Their scores g_v give the
     variance of the estimate (White's sandwich over clusters), each freed of what the fit has already taken up of its own
     view (Bell and McCaffrey's CR2), and Student's quantile with their degrees of freedom accounts for the number of views.
 

@@ -25,7 +25,7 @@ _COUNTED = {
 
 
 class Board(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A calibration board: columns and rows as on the command line, lengths in metres.
+    """A calibration board: columns and rows as on the command line, lengths in meters.
 
     Attributes:
         kind: a checkerboard, a ChArUco board (a checkerboard with markers in its white squares), or Kalibr's AprilGrid.
@@ -131,7 +131,7 @@ def board_of_size(
     if kind == "checkerboard" and min(columns, rows) < 3 and max(columns, rows) < 4:
         raise InputError(f"board {size!r}: too few corners to tell a lens; use one with at least 4 x 3 inner corners")
     if not 0.1 <= square_mm <= 10_000.0:
-        raise InputError(f"squares of {square_mm:g} mm: give the side of a square in millimetres, from 0.1 to 10000")
+        raise InputError(f"squares of {square_mm:g} mm: give the side of a square in millimeters, from 0.1 to 10000")
     _refuse_foreign(kind, marker_mm=marker_mm, tag_spacing=tag_spacing, dictionary=dictionary)
     square_m = square_mm / 1e3
     if kind == "checkerboard":

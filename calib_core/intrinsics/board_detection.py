@@ -11,7 +11,7 @@ draws the AprilTags of family 36h11 turned by 180 degrees against AprilTag's own
 that OpenCV calls the first is the lower right one on a Kalibr grid. Grids printed with OpenCV's images exist too; the
 orientation that makes a plane of the whole grid is taken.
 
-Corners to a fraction of a pixel: the window around each follows the distance to its neighbours. Where four squares meet, the
+Corners to a fraction of a pixel: the window around each follows the distance to its neighbors. Where four squares meet, the
 brightness has a saddle point. A first estimate is where the gradients point along the lines through it (OpenCV's cornerSubPix);
 then the saddle point of a quadratic that is fitted to the smoothed image, which uses all of the light around the corner
 instead of the edges alone.
@@ -197,7 +197,7 @@ _QUICK_WIDTH_PX = 960
 _ROBUST_WIDTHS_PX = (640, 320)  # the smaller one also finds blurred boards, which are to be named
 _CROSSING_SHARE = 0.75  # of the contrast inside; at a board's border it is half
 _LEAST_SPACING_PX = 4.0
-_MOST_BENT = 0.35  # second difference of neighbouring corners over their distance
+_MOST_BENT = 0.35  # second difference of neighboring corners over their distance
 _MOST_MOVED = 0.3  # by the refinement, over the distance to the next corner
 
 
@@ -333,7 +333,7 @@ def _inner_crossing(grey: np.ndarray, grid: np.ndarray) -> np.ndarray:
 
 
 def _spacing(grid: np.ndarray) -> np.ndarray:
-    """Return the distance of each corner to its nearest neighbour in the grid (rows, columns, 2): (rows * columns,) [px]."""
+    """Return the distance of each corner to its nearest neighbor in the grid (rows, columns, 2): (rows * columns,) [px]."""
     rows, columns, _ = grid.shape
     nearest = np.full((rows, columns), np.inf)
     along, down = np.linalg.norm(np.diff(grid, axis=1), axis=2), np.linalg.norm(np.diff(grid, axis=0), axis=2)
@@ -347,7 +347,7 @@ def _spacing(grid: np.ndarray) -> np.ndarray:
     return nearest.ravel()
 
 
-_WINDOW_SHARE = 0.22  # half the window over the distance to the nearest neighbour
+_WINDOW_SHARE = 0.22  # half the window over the distance to the nearest neighbor
 _SMALLEST_PX, _LARGEST_PX = 2, 9
 _STEPS, _ENOUGH_PX = 40, 1e-3
 _SMOOTHING_PX = 1.2
@@ -360,7 +360,7 @@ _SADDLE_ROUNDS, _LARGEST_STEP_PX = 4, 1.0
 def refined_corners(grey: np.ndarray, corners_px: Points2, spacing_px: Values) -> Points2:
     """Move each corner (n, 2) to where four squares meet.
 
-    A window that reaches the next corner is pulled towards it; a small one collects little light, and much noise.
+    A window that reaches the next corner is pulled toward it; a small one collects little light, and much noise.
 
     Args:
         grey: uint8 (h, w).

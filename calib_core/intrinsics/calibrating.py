@@ -331,7 +331,7 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
         test: of the board's shape.
         amounts: (s,) of the warps that were found.
         sigmas: (s,) of the same.
-        modelled: whether the lens was calibrated with the board's shape as found.
+        modeled: whether the lens was calibrated with the board's shape as found.
     """
     shapes = dict(zip(test.found.names, zip(amounts.tolist(), sigmas.tolist(), strict=True), strict=True))
     stretched = shapes.pop(STRETCH, None)

@@ -208,7 +208,7 @@ class BoardSearch:
         views: those to calibrate with, in order of their numbers.
         left_out: the others in which the board is, or was expected, with the reason.
         searched: how many images were looked at.
-        complete: whether all were; False after a cancelled search.
+        complete: whether all were; False after a canceled search.
         indices: their numbers, ascending.
         found: all views that were found, the ones left out included, for a search that goes on from here.
     """

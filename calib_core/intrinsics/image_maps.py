@@ -50,7 +50,7 @@ class ResidualField:
 
     @property
     def neighbours_alike(self) -> bool:
-        """Whether neighbouring corners of a view err alike."""
+        """Whether neighboring corners of a view err alike."""
         return self.neighbour_correlation > _CORRELATED
 
 

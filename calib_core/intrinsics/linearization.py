@@ -175,7 +175,7 @@ class LensState:
     def moved(self, camera: Camera, poses: np.ndarray, amounts: Values) -> "LensState":
         """Return the state with another lens and shape, and poses changed by (dt, dtheta) (v, 6)."""
         rotations = rotation_exp(poses[:, 3:]) @ self.rotations
-        # a rotation up to rounding: one Newton step towards the nearest rotation squares the error
+        # a rotation up to rounding: one Newton step toward the nearest rotation squares the error
         rotations = 1.5 * rotations - 0.5 * rotations @ (np.swapaxes(rotations, 1, 2) @ rotations)
         return LensState(camera, rotations, self.translations_m + poses[:, :3], amounts)
 

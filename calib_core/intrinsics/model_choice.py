@@ -178,7 +178,7 @@ _POSE_STEPS = 6
 
 
 def view_folds(views: int, most: int) -> Indices:
-    """Return the number of the fold of each view: as equal as possible, neighbours in time together."""
+    """Return the number of the fold of each view: as equal as possible, neighbors in time together."""
     return np.arange(views) * min(views, most) // views
 
 

@@ -350,7 +350,7 @@ def _returns_origin(
     body = named_origin(frame) == "body" or options.radar_frame == "body"
     if stated is not None and not np.isfinite(stated).all():
         raise RecordingError(
-            f"--radar-mount {' '.join(map(str, stated))}: give x y z in metres, then roll pitch yaw in degrees"
+            f"--radar-mount {' '.join(map(str, stated))}: give x y z in meters, then roll pitch yaw in degrees"
         )
     mounted = (
         (mount_of(stated), "") if stated is not None else recorded_mount(topics, frame, radar=topic.name, body=body)

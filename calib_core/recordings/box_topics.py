@@ -1,4 +1,4 @@
-"""Recognise and read topics of boxes (vision_msgs, darknet_ros_msgs, Foxglove), each message with the frame it was made from."""
+"""Recognize and read topics of boxes (vision_msgs, darknet_ros_msgs, Foxglove), each message with the frame it was made from."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ _HYPOTHESES = (("hypothesis.class_id", "hypothesis.score"), ("id", "score"))
 _TRACKS = ("tracking_id", "track_id")
 _STAMPS = ("image_header.stamp", "header.stamp")
 _HALF_PX = 0.5
-"""Detectors count from the corner of the top-left pixel, whose centre is our (0, 0)."""
+"""Detectors count from the corner of the top-left pixel, whose center is our (0, 0)."""
 _LINE_LOOP, _LINE_STRIP = 2, 3
 _SQUARE_PX = 0.5
 STAMP_TOLERANCE_NS = 1_000_000
@@ -39,8 +39,8 @@ class BoxLayout:
         name: what kind of message it is, for people.
         boxes: the list of boxes.
         stamp: path of the image's stamp in the message; "" if every element has its own (Foxglove).
-        edges: paths of left, top, right and bottom; empty if the centre is given.
-        centre: paths of the centre's u and v, the width and the height; empty if the edges are given.
+        edges: paths of left, top, right and bottom; empty if the center is given.
+        center: paths of the center's u and v, the width and the height; empty if the edges are given.
         angle: path of the rectangle's turn [rad]; "" without one.
         label: path of the class; "" if it is among the hypotheses, or there is none.
         score: path of the confidence; "" likewise.
@@ -229,8 +229,8 @@ def upright(values: Sequence[float], angle_rad: float) -> list[float]:
     """Return the edges of the upright box around a rectangle that may be turned.
 
     Args:
-        values: u and v of its centre, its width and height.
-        angle_rad: of the turn about its centre.
+        values: u and v of its center, its width and height.
+        angle_rad: of the turn about its center.
     """
     u_px, v_px, width_px, height_px = values
     cosine, sine = (abs(math.cos(angle_rad)), abs(math.sin(angle_rad))) if math.isfinite(angle_rad) else (1.0, 0.0)

@@ -271,7 +271,7 @@ def radar_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning
             DataWarning.reported(
                 "flat-radar",
                 f"{name} has the same height ({height[0]:g} m) for every return: it measures no elevation",
-                "put the reflector's centre at the radar's height at every placement, and measure the camera position",
+                "put the reflector's center at the radar's height at every placement, and measure the camera position",
             )
         )
     return warnings

@@ -268,7 +268,7 @@ class Recording:
 
     @property
     def has_plain_clouds(self) -> bool:
-        """Whether all radar messages are PointCloud2 with x, y, z in metres in the radar's axes, as any viewer draws them."""
+        """Whether all radar messages are PointCloud2 with x, y, z in meters in the radar's axes, as any viewer draws them."""
         parts = self._assembly.radar.parts if self._assembly.radar else ()
         return bool(parts) and all(
             part.topic.type.replace("/msg/", "/") == "sensor_msgs/PointCloud2" and part.layout.plan.is_plain_xyz

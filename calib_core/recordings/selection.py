@@ -161,7 +161,7 @@ def _no_radar(definition: Definition, topic: str) -> Usage:
 def _unrecognised(what: str, names: Sequence[str]) -> Usage:
     shown = ", ".join(names[:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
     return Usage("other", problem=(
-        f"not read as a radar: {what} {shown}, and no position and speed or amplitude is recognised among them; if it is "
+        f"not read as a radar: {what} {shown}, and no position and speed or amplitude is recognized among them; if it is "
         "one, say which is which, such as --map x=FIELD:m --map y=FIELD:m"
     ))  # fmt: skip
 

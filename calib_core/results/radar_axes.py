@@ -16,7 +16,7 @@ class RadarAxesSigma:
     A radar without elevation determines forward, left and the rotation about up; the others come from assumptions.
 
     Attributes:
-        position_m: (3,) of the camera centre: forward, left, up.
+        position_m: (3,) of the camera center: forward, left, up.
         rotation_rad: (3,) about forward (roll), left (pitch) and up (yaw).
     """
 

@@ -118,7 +118,7 @@ def squared_height(sigma_m: float) -> SystematicError:
 
 
 def reflector_offset(axis: int, name: str, sigma_m: float) -> SystematicError:
-    """Return a shift of the clicked point from the phase centre along an axis of the camera."""
+    """Return a shift of the clicked point from the phase center along an axis of the camera."""
 
     def column(at: Sensitivity) -> np.ndarray:
         return np.asarray(at.d_point[..., axis, :, :])
@@ -546,7 +546,7 @@ class DominantError:
     """An error, or one along several axes, with a third or more of the variance of the position, the rotation or both.
 
     Attributes:
-        largest: of one kind, such as the clicks' distance from the phase centre along three axes.
+        largest: of one kind, such as the clicks' distance from the phase center along three axes.
         position_share: their part of the variance of the translation; 0 if below a third.
         rotation_share: the same of the rotation.
         position_cm: standard deviation of the whole translation.

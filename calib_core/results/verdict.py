@@ -38,7 +38,7 @@ class StatedError:
 
     Attributes:
         rotation_deg: angle between the stated and the true rotation; of a radar without elevation, about its up axis.
-        position_cm: distance between the camera centres; NaN for a radar without elevation, whose mounting decides it.
+        position_cm: distance between the camera centers; NaN for a radar without elevation, whose mounting decides it.
         image_px: distance in the image between where a radar position in the middle of the placements reprojects and where
             it is; NaN if unknown.
         range_m: of that position: the median of the placements.
@@ -144,7 +144,7 @@ class Assumed:
     """What a stated error rests on and no pair can show: what moves the pose and leaves every residual as it is.
 
     Attributes:
-        measured: the camera position was measured, and is right; otherwise, that the phase centre was clicked.
+        measured: the camera position was measured, and is right; otherwise, that the phase center was clicked.
         alone_cm: how well the pairs alone place the camera; NaN if unknown, or not measured.
         not_mirrored: no radar axis is mirrored.
         elevations: the radar's elevations are right.
@@ -262,7 +262,7 @@ def _alone_cm(calibration: Calibration) -> float:
 
 
 def _states_error(calibration: Calibration) -> bool:
-    """Return whether the covariance can be one of a pose in metres and radians; a file may state anything."""
+    """Return whether the covariance can be one of a pose in meters and radians; a file may state anything."""
     variances = np.diag(calibration.covariance)
     return bool(np.isfinite(calibration.covariance).all()) and bool(
         ((variances > _LEAST_VARIANCE) & (variances < _MOST_VARIANCE)).all()

@@ -216,7 +216,7 @@ def residuals_text(field: "ResidualField") -> str:
     if field.systematic:
         said.append(f"the views share a pattern of {field.systematic_px:.3f} px over the image")
     if field.neighbours_alike:
-        said.append(f"neighbouring corners of a view err alike (correlation {field.neighbour_correlation:.1f})")
+        said.append(f"neighboring corners of a view err alike (correlation {field.neighbour_correlation:.1f})")
     if not said:
         return "The residuals show no pattern that is more than noise."
     return (

@@ -105,7 +105,7 @@ ERRORS: Mapping[str, ErrorWords] = {
     "squared_height_m2": ErrorWords(
         "height, squared",
         "the height of the placements",
-        _by("near placements, and the reflector's centre at the radar's height,", SpreadPlacements("near")),
+        _by("near placements, and the reflector's center at the radar's height,", SpreadPlacements("near")),
         unit="m²",
     ),
     "range_bias_m": ErrorWords(
@@ -123,11 +123,11 @@ ERRORS: Mapping[str, ErrorWords] = {
         "%",
     ),
     "reflector_right_m": ErrorWords(
-        "clicks right of centre", "clicks to the right of the radar's phase centre", _APEX, 100.0, "cm"
+        "clicks right of center", "clicks to the right of the radar's phase center", _APEX, 100.0, "cm"
     ),
-    "reflector_down_m": ErrorWords("clicks below centre", "clicks below the radar's phase centre", _APEX, 100.0, "cm"),
+    "reflector_down_m": ErrorWords("clicks below center", "clicks below the radar's phase center", _APEX, 100.0, "cm"),
     "reflector_forward_m": ErrorWords(
-        "clicks beyond centre", "clicks beyond the radar's phase centre", _APEX, 100.0, "cm"
+        "clicks beyond center", "clicks beyond the radar's phase center", _APEX, 100.0, "cm"
     ),
     "click_right_px": ErrorWords(
         "clicks off, right", "clicks or the principal point too far to the right", _PRINCIPAL_POINT, unit="px"
@@ -144,7 +144,7 @@ ERRORS: Mapping[str, ErrorWords] = {
 
 FAMILIES: Mapping[str, FamilyWords] = {
     "reflector_": FamilyWords(
-        "clicks off the phase centre", "the distance of the clicked point from the radar's phase centre"
+        "clicks off the phase center", "the distance of the clicked point from the radar's phase center"
     ),
     "click_": FamilyWords("clicks or principal point", "the principal point, or a constant click offset"),
     "principal_": FamilyWords("principal point", "the principal point"),

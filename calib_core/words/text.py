@@ -124,7 +124,7 @@ def say(template: str, /, **values: object) -> Words:
 
 
 def _merge_strings(parts: Iterable[Part]) -> Words:
-    """Merge neighbouring strings, so that equal words have equal parts."""
+    """Merge neighboring strings, so that equal words have equal parts."""
     merged: list[Part] = []
     for part in parts:
         if isinstance(part, str) and merged and isinstance(merged[-1], str):

@@ -236,7 +236,7 @@ def assumed_words(assumed: Assumed | None) -> Words:
         alone = f" (the pairs alone: within {assumed.alone_cm:g} cm)" if np.isfinite(assumed.alone_cm) else ""
         first = f"a correct camera position{alone}"
     else:
-        first = "clicks on the phase centre"
+        first = "clicks on the phase center"
     principal_point = f"the principal point within {assumed.principal_point_px:.2g} px"
     parts = (
         first,

@@ -86,14 +86,14 @@ def residuals_too_large(*, chi2_per_degree: float) -> Remark:
 
 
 def smooth_angle_errors(*, growth: float, uncertain_lens: bool) -> Remark:
-    """Given when neighbouring placements have similar residuals.
+    """Given when neighboring placements have similar residuals.
 
     Could also be: a radar's calibration error from wrong lens parameters: both change slowly with direction.
     `radar_angle_map` in the calibration corrects either (formats.md).
     """
     lens = "a lens as uncertain as its covariance says can look the same: first refine the intrinsics with the pose; "
     return remark(
-        "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
+        "neighboring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
         f"direction; this makes the stated rotation uncertainty {growth:.1f} times larger",
         f"{lens if uncertain_lens else ''}more placements will not average this out: correct the radar's angles by "
         "radar_angle_map of the calibration, or calibrate the radar; the stated uncertainty includes the error",
@@ -437,7 +437,7 @@ def camera_position_contradicted(
     """Given when the pairs alone put the camera farther from the measured position than one of 1,000 right sets does.
 
     Could also be: whether the measured position, the intrinsics or the radar is wrong, or all clicks lie beside the radar's
-    phase centre.
+    phase center.
     """
     return _measured_position(_far_from_measured(away_cm, sigmas, misread, unit), weight)
 
@@ -464,7 +464,7 @@ def _far_from_measured(away_cm: float, sigmas: float, misread: str, unit: str) -
 def _measured_position(message: str, weight: float) -> Remark:
     use = "the pose follows the pairs" if weight < 0.5 else f"the pose still uses it, as {weight:.0%} sure"
     return remark(
-        f"{message}; clicks that all lie as far beside the radar's phase centre would look the same; {use}",
+        f"{message}; clicks that all lie as far beside the radar's phase center would look the same; {use}",
         f"measure again from the radar's antennas to the lens: forward, left, up; click {_APEX}; and check that the intrinsics "
         "are of this lens, zoom and image size",
         MeasureCameraPosition(),
@@ -502,12 +502,12 @@ def intrinsics_suspected(
         )
     if focal_length is not None:
         message = (
-            "residuals grow with the distance from the image's centre: the given focal length seems "
+            "residuals grow with the distance from the image's center: the given focal length seems "
             f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}"
         )
     else:
         message = (
-            "residuals grow with the cube of the distance from the image's centre: the given lens distortion seems off by "
+            "residuals grow with the cube of the distance from the image's center: the given lens distortion seems off by "
             f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click"
         )
     return remark(
@@ -533,9 +533,9 @@ _OF_SHAPES = {
     "azimuth": "more and more with the azimuth",
     "elevation": "more and more with the elevation",
     "azimuth^2": "at both edges",
-    "azimuth elevation": "more and more towards opposite corners",
+    "azimuth elevation": "more and more toward opposite corners",
     "elevation^2": "at high and low placements",
-    "azimuth^3": "more and more towards the edges",
+    "azimuth^3": "more and more toward the edges",
     "time": "more and more in the course of the recording",
 }
 _OF_STEPS = {
@@ -621,7 +621,7 @@ def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured:
     """Given when the radar's azimuths or elevations look scaled by more than 1.5 % and three standard deviations.
 
     Could also be: azimuths: a focal length that is off by the same amount. Elevations, on flat ground: clicks above or
-    below the phase centre. Both, with a measured camera position: that position.
+    below the phase center. Both, with a measured camera position: that position.
     """
     tape = "; so would a camera that is not where it was measured" if measured else ""
     size = percent(abs(value), sigma)
@@ -636,7 +636,7 @@ def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured:
         )
     large, side = ("large", "above") if value > 0.0 else ("small", "below")
     return remark(
-        f"the radar's elevations look {size} too {large}; on flat ground, clicks {side} the radar's phase centre would look the "
+        f"the radar's elevations look {size} too {large}; on flat ground, clicks {side} the radar's phase center would look the "
         f"same{tape}",
         f"click {_APEX}; to tell the two apart, put a few placements at other heights (a tripod)",
         SpreadPlacements("heights"),
@@ -666,19 +666,19 @@ def lens_or_radar_scale(*, change: float, sigma: float, scales: Sequence[Systema
 def units_suspected(
     *, nearest: float = 0.0, farthest: float = 0.0, unit: str = "", factor: float = 1.0, camera_away: float = 0.0
 ) -> Remark:
-    """Given when radar positions, or the measured camera position, are too far away for metres.
+    """Given when radar positions, or the measured camera position, are too far away for meters.
 
     Could also be: feet, if no camera position is measured: every length, the pose's too, is then in feet.
     """
     if camera_away:
         return remark(
-            f"the measured camera position is {camera_away:,.0f} m from the radar: is it in metres?",
-            "the camera position must be in metres",
+            f"the measured camera position is {camera_away:,.0f} m from the radar: is it in meters?",
+            "the camera position must be in meters",
             MeasureCameraPosition(),
         )
     return remark(
         f"the radar positions are {nearest:,.0f} to {farthest:,.0f} m away: the ranges look like {unit}",
-        f"radar positions must be in metres: multiply them by {factor:g}",
+        f"radar positions must be in meters: multiply them by {factor:g}",
     )
 
 
@@ -906,7 +906,7 @@ def no_camera() -> Remark:
 def camera_turned(*, turned_deg: float, last_s: float, first_s: float, ids: Sequence[str], before: bool) -> Remark:
     """Given when the still image shows that the camera turned between two placements, by more than a click is off by.
 
-    Could also be: a camera that was moved by centimetres.
+    Could also be: a camera that was moved by centimeters.
     """
     return remark(
         say(

@@ -84,7 +84,7 @@ export function nameFields(changed) {
 /** The radar's pose in a third frame. @param {string[]} values as kept @param {(values: string[]) => void} changed */
 export function parentFields(values, changed) {
   const label = make("span", "", "Radar pose in the kit, rig or ego frame");
-  label.dataset.hint = "parent_from_radar: position in metres, rotation as a quaternion in the order x y z w. By default the radar is the origin.";
+  label.dataset.hint = "parent_from_radar: position in meters, rotation as a quaternion in the order x y z w. By default the radar is the origin.";
   /** @type {HTMLInputElement[]} */
   const inputs = [];
   const soon = afterTyping(() => changed(inputs.map((input, index) => input.value.trim() || IDENTITY[index])));

@@ -322,7 +322,7 @@ function drawOptions() {
     chip(trail ? `Last ${trail} s` : "One scan", "For how long returns stay; they fade with age. Click for longer.", trail > 0, { trail_s: next }),
     chip("Whole recording", "Where there were static returns at any time: the stronger, the longer. What is faint came and went.", map, { map: !map, whole: !whole }),
   ];
-  if (hasAmplitude) chips.push(chip("Amplitude", "Colour by amplitude, else by speed: static returns are blue dots, moving ones orange triangles.", colour === "amplitude", { colour: colour === "amplitude" ? "speed" : "amplitude" }));
+  if (hasAmplitude) chips.push(chip("Amplitude", "Color by amplitude, else by speed: static returns are blue dots, moving ones orange triangles.", colour === "amplitude", { colour: colour === "amplitude" ? "speed" : "amplitude" }));
   group.replaceChildren(...chips);
 }
 

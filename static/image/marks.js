@@ -202,7 +202,7 @@ function hollowCross(pen, x, y, arm, gap) {
 /** @type {[Layer, string, string][]} */
 const LAYERS = [
   ["returns", "Returns", "Radar returns of the nearest scan, projected into the image: dots are static, triangles are moving. (1)"],
-  ["others", "All clicks", "Clicks in all other frames, coloured by residual. (2)"],
+  ["others", "All clicks", "Clicks in all other frames, colored by residual. (2)"],
   ["ellipses", "95 %", "Ellipses around the reprojections that contain 95 % of the clicks of good pairs. (3)"],
   ["predictions", "Predicted", "Expected position of the reflector in this placement (circle) and best next placement (diamond). (4)"],
 ];

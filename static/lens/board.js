@@ -64,7 +64,7 @@ export function boardForm(start) {
     read() {
       const said = { kind: /** @type {Described["kind"]} */ (kind.value), size: size.value.trim(), square_mm: number(square), marker_mm: kind.value === "checkerboard" ? 0 : number(marker), dictionary: kind.value === "charuco" ? dictionary.value : "", model: model.value };
       const bad = !said.size || !Number.isFinite(said.square_mm) || !Number.isFinite(said.marker_mm);
-      problem.textContent = bad ? "Fill in the size of the board and its measures in millimetres." : "";
+      problem.textContent = bad ? "Fill in the size of the board and its measures in millimeters." : "";
       if (bad) return null;
       try {
         localStorage.setItem(KEPT, JSON.stringify(said));

@@ -45,7 +45,7 @@ const LABELS = {
   "refining.focal_length_sigma": "Focal length (0.03 = 3 %)",
   "refining.principal_point_sigma_px": "Principal point",
   "refining.distortion_sigma": "Distortion (k1)",
-  "reflector.offset_sigma_m": "Clicked point to phase centre",
+  "reflector.offset_sigma_m": "Clicked point to phase center",
   "reflector.click_offset_sigma_px": "Click offset",
   "solving.sensors_above_placements": "Sensors above the placements",
 };

@@ -96,7 +96,7 @@ function part(name, rows) {
 }
 
 function note() {
-  return make("p", "note", ["Every click is saved to disk immediately; there is no save button. Colours run from blue (small residual) to red (large). Point at a figure or a control, or go to it with ", key("Tab"), ", for an explanation."]);
+  return make("p", "note", ["Every click is saved to disk immediately; there is no save button. Colors run from blue (small residual) to red (large). Point at a figure or a control, or go to it with ", key("Tab"), ", for an explanation."]);
 }
 
 /** @param {string} name */

@@ -77,7 +77,7 @@ function found() {
 }
 
 /** What is said if nothing can be done: why not what fits best. @param {Entry|undefined} best */
-const nothing = (best) => (best ? `${best.words}: ${best.reason}.` : "Nothing found. Try another word, such as zoom, outlier, colour or save.");
+const nothing = (best) => (best ? `${best.words}: ${best.reason}.` : "Nothing found. Try another word, such as zoom, outlier, color or save.");
 
 function draw() {
   const all = found();

@@ -1,4 +1,4 @@
-/** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
+/** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-center cloud indicates a bias. */
 
 import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
 import { make } from "../base/notices.js";
@@ -15,7 +15,7 @@ export function startScatter() {
   canvas.tabIndex = -1;
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", "Reprojection minus click");
-  canvas.dataset.hint = "Reprojection minus click for every pair. An off-centre cloud indicates a bias. Click a mark to go to its frame.";
+  canvas.dataset.hint = "Reprojection minus click for every pair. An off-center cloud indicates a bias. Click a mark to go to its frame.";
   document.querySelector("#page-pose .pose")?.append(canvas);
   canvas.addEventListener("click", pressed);
   onPainted(["view", "selected", "theme", "box"], draw);

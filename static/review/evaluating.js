@@ -32,7 +32,7 @@ export function startEvaluating() {
     { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withImages },
   );
   const load = make("button", "second", "Load boxes…");
-  load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on this sheet does the same.";
+  load.dataset.hint = "Boxes of a labeling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on this sheet does the same.";
   find.dataset.hint = "Boxes around whatever moves before a camera that stands still.";
   load.onclick = chooseBoxes;
   find.onclick = findMoving;

@@ -120,8 +120,8 @@ function startChips() {
   largeChip.append(icon("large"));
   for (const [made, id] of /** @type {[HTMLElement, string][]} */ ([[cameraChip, "space-camera"], [largeChip, "space-large"], [hideChip, "space-hide"], [trailChip, "space-trail"], [colours, "space-colour"]])) made.id = id;
   group.append(cameraChip, colours, trailChip, largeChip, hideChip);
-  colours.setAttribute("aria-label", "What the colours of the returns mean");
-  colours.dataset.hint = "What the colours of the returns mean";
+  colours.setAttribute("aria-label", "What the colors of the returns mean");
+  colours.dataset.hint = "What the colors of the returns mean";
   colours.onchange = () => change({ colour: /** @type {Colour} */ (colours.value) });
   readout.setAttribute("role", "status");
   pane.append(make("div", "space-bar", [legend, standing]), readout, whyFlat);

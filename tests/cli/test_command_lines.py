@@ -82,7 +82,7 @@ _TABLE = [
     (2, "solve a.bag --propose --auto", "--propose solves nothing: give a recording"),
     (2, "solve a.bag --json", "--json applies with --propose only"),
     (2, "solve a.bag --camera-position-m 0 1 4cm", "takes X Y Z, as numbers like 0.5, without units, not '0 1 4cm'"),
-    (2, "solve a.bag --propose --camera-position-m 3 2 110", "Give metres: 0.11 or 1.1, if it is in mill"),
+    (2, "solve a.bag --propose --camera-position-m 3 2 110", "Give meters: 0.11 or 1.1, if it is in mill"),
     (2, "solve a.bag --camera-position-by eye", "--camera-position-by"),
     (2, "solve a.bag --vehicle a/b", "--vehicle: 'a/b' cannot be a name; give one without slashes"),
     (2, "solve a.bag --session-name ..", "--session-name: '..' cannot be a name"),

@@ -244,7 +244,7 @@ def _options(document: SessionDocument, where: str) -> CalibrationOptions:
     if document.camera_position_sigma_m is not None:
         prior = CameraPositionPrior(position, document.camera_position_sigma_m)
     if not 0.0 < prior.sigma_m < 10.0 or not all(abs(value) < 100.0 for value in position):
-        raise InputError(f"{where}: camera_position_m: give metres, and a standard deviation above 0")
+        raise InputError(f"{where}: camera_position_m: give meters, and a standard deviation above 0")
     solving = replace(options.solving, camera_position=prior)
     return replace(options, solving=solving)
 

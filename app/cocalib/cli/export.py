@@ -43,7 +43,7 @@ class Export:
         tuple[float, float, float, float, float, float, float] | None,
         called("X Y Z QX QY QZ QW"),
     ] = None
-    """Pose of the radar in the parent frame of autoware (kit), driveworks (rig) or nuscenes (ego): metres, quaternion, w last."""
+    """Pose of the radar in the parent frame of autoware (kit), driveworks (rig) or nuscenes (ego): meters, quaternion, w last."""
 
     rectified: Switch = False
     """Your images are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""

@@ -36,11 +36,11 @@ class Show:
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
     boxes: Annotated[str | None, called("FILE_OR_TOPIC"), INPUT] = None
-    """Boxes around objects, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
+    """Boxes around objects, drawn with their classes and evaluated (Acc): a file of a labeling tool, or a topic."""
     against: File = None
     """Another calibration, whose returns are shown too."""
     colour: Literal["range", "speed"] = "range"
-    """What the colours of returns show."""
+    """What the colors of returns show."""
     trail: int = _TRAIL_SCANS
     """In a video: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
     web: Switch = False

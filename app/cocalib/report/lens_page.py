@@ -74,7 +74,7 @@ def _board_text(lens: CalibratedLens) -> str:
 
 def _foot() -> str:
     return (
-        "Pixel (0, 0) is the centre of the top-left pixel. Sigma is one standard deviation. Held out: with the lens calibrated "
+        "Pixel (0, 0) is the center of the top-left pixel. Sigma is one standard deviation. Held out: with the lens calibrated "
         "without that view. The same images give the same file, byte for byte."
     )
 

@@ -95,6 +95,6 @@ def _definitions(subject: ReportSubject) -> Markup | None:
 
 def _foot() -> str:
     return (
-        "Radar: x forward, y left, z up. Camera: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel. "
+        "Radar: x forward, y left, z up. Camera: x right, y down, z forward. Pixel (0, 0) is the center of the top-left pixel. "
         "AED and CDSD divide by N and N - 1. The same inputs give the same file, byte for byte."
     )

@@ -1,4 +1,4 @@
-"""Plots as SVG: axes with round ticks, and marks that differ in shape, not in colour alone."""
+"""Plots as SVG: axes with round ticks, and marks that differ in shape, not in color alone."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

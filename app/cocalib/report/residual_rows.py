@@ -243,7 +243,7 @@ def place_sentence(rows: ResidualRows, image_size_px: tuple[int, int]) -> str:
         (
             np.linalg.norm(pixels - centre, axis=1),
             "away from the middle of the image",
-            "towards the middle of the image",
+            "toward the middle of the image",
         ),
     )
     tried = [(found, up, down) for values, up, down in ways if (found := trend(values, lengths)) is not None]

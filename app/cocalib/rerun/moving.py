@@ -54,7 +54,7 @@ class Streamed:
 
 
 def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[TimesNs]:
-    """Write every scan's returns in the radar's frame, coloured; yield the stamps of what was written."""
+    """Write every scan's returns in the radar's frame, colored; yield the stamps of what was written."""
     for window in view.recording.radar_windows():
         known = np.flatnonzero(np.isfinite(window.points_radar_m).all(axis=1))
         scans = window.take(known)

@@ -37,9 +37,9 @@ ACC = f"{METRICS}/acc_percent"
 RETURNS_SEEN = f"{METRICS}/returns_in_image"
 SUMMARY = "summary"
 HALF_PIXEL_PX = 0.5
-"""Rerun's (0, 0) is the corner of the top-left pixel, ours its centre."""
+"""Rerun's (0, 0) is the corner of the top-left pixel, ours its center."""
 LARGE_PX = 30.0
-"""Residuals from here on have the last colour, as on the page."""
+"""Residuals from here on have the last color, as on the page."""
 _AGAINST = (230, 120, 230)
 _CAMERA = (87, 182, 242)
 _FRUSTUM_SHARE = 0.06
@@ -181,7 +181,7 @@ def _lines(view: RecordedView) -> Iterator[str]:
     yield from _figures(view)
     what = "range" if view.colours.quantity == "range" else "radial speed"
     low, high = view.colours.ends
-    yield f"returns: coloured by {what}, {low} to {high}"
+    yield f"returns: colored by {what}, {low} to {high}"
     if view.against is not None:
         yield "pink: the other calibration"
     if view.pairs:

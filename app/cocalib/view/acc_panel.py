@@ -111,7 +111,7 @@ def _figures(boxes: BoxFigures) -> tuple[Figure, ...]:
             value,
             "%",
             "Mean over the frames of the share of the moving targets' returns that are in their target's box, ± its standard "
-            "error with neighbouring frames taken together. It is not the accuracy of the pose.",
+            "error with neighboring frames taken together. It is not the accuracy of the pose.",
         ),
         Figure(
             "acc_frames",

@@ -161,10 +161,10 @@ _POSITION = (
     (
         "camera_x",
         "camera forward",
-        f"Camera centre ahead of the radar or behind it, along its x axis, {_SIGMA}",
+        f"Camera center ahead of the radar or behind it, along its x axis, {_SIGMA}",
     ),
-    ("camera_y", "camera left", f"Camera centre to the side of the radar, along its y axis, {_SIGMA}"),
-    ("camera_z", "camera up", f"Camera centre above or below the radar, along its z axis, {_SIGMA}"),
+    ("camera_y", "camera left", f"Camera center to the side of the radar, along its y axis, {_SIGMA}"),
+    ("camera_z", "camera up", f"Camera center above or below the radar, along its z axis, {_SIGMA}"),
 )
 _ANGLES = (
     ("roll", "roll to the right", f"Camera tilted to its side, {_AHEAD}, {_SIGMA}"),
@@ -183,7 +183,7 @@ class Mounting:
     """The position and orientation of the camera relative to the radar.
 
     Attributes:
-        position_m: (3,) camera centre in the radar frame.
+        position_m: (3,) camera center in the radar frame.
         position_sigma_m: (3,) its standard deviations; NaN if unknown.
         roll_pitch_yaw_rad: (3,) rotations about the radar's x, y, z axes, Rz(yaw) Ry(pitch) Rx(roll), relative to looking
             straight forward. Positive roll tips the camera to its right, positive pitch looks down, positive yaw looks left.
@@ -199,7 +199,7 @@ class Mounting:
 def mounting_of(calibration: Calibration) -> Mounting:
     """Turn camera_from_radar and its covariance into a mounting.
 
-    With t = t_hat + dt and R = Exp(dtheta) R_hat the centre c = -R^T t moves by -R^T dt - R^T [t]x dtheta,
+    With t = t_hat + dt and R = Exp(dtheta) R_hat the center c = -R^T t moves by -R^T dt - R^T [t]x dtheta,
     and the mounted body turns about its own axes by -(optical_from_body)^T dtheta, to first order.
     """
     rotation = calibration.camera_from_radar.rotation

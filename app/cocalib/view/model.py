@@ -58,7 +58,7 @@ class Ellipse(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         semi_major_px: semi-major axis.
         semi_minor_px: semi-minor axis.
-        angle_rad: from the image's x axis (right) towards its y axis (down) to the longer axis.
+        angle_rad: from the image's x axis (right) toward its y axis (down) to the longer axis.
     """
 
     semi_major_px: float
@@ -169,7 +169,7 @@ class VerdictRow:
     """How far the calibration can be trusted, in one line, and what to do.
 
     Attributes:
-        level: decides word, colour and shape.
+        level: decides word, color and shape.
         line: behind the word: ": within 0.5 deg, 6 cm (95 %); 7 px at 20 m".
         action: the one thing that helps most, as a sentence.
         assumes: what the stated error rests on and no pair can show, as a sentence; empty if there is nothing.

@@ -47,7 +47,7 @@ def reference_words(session: Session, reference: Reference) -> str:
 
 @lru_cache(maxsize=4)
 def comparison_figures(reference: Reference, calibration: Calibration) -> tuple[Figure, ...]:
-    """Return how far the solved calibration is from the reference: in degrees, centimetres, and pixels by distance."""
+    """Return how far the solved calibration is from the reference: in degrees, centimeters, and pixels by distance."""
     both = compare(imported(CalibrationFile(reference.calibration)), imported(CalibrationFile(calibration)))
     return (
         Figure(

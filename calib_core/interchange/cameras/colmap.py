@@ -1,4 +1,4 @@
-"""COLMAP's cameras.txt, which puts the centre of the top-left pixel at (0.5, 0.5)."""
+"""COLMAP's cameras.txt, which puts the center of the top-left pixel at (0.5, 0.5)."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -94,7 +94,7 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
 
 
 def _write(camera: Camera, _name: str) -> str:
-    columns = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]; the first pixel's centre is at (0.5, 0.5)"
+    columns = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]; the first pixel's center is at (0.5, 0.5)"
     return f"# {TAG}\n{columns}\n{colmap_camera_line(camera)}"
 
 

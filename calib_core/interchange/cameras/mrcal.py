@@ -1,4 +1,4 @@
-"""mrcal's cameramodel: a dictionary in Python's syntax. Pixels count as ours do, from the centre of the first one."""
+"""mrcal's cameramodel: a dictionary in Python's syntax. Pixels count as ours do, from the center of the first one."""
 
 import ast
 from collections.abc import Mapping

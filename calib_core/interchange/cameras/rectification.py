@@ -55,7 +55,7 @@ def rectified_camera(camera: Camera) -> Camera:
         share = seen
     if share < _SMALLEST:
         raise InputError(
-            "no rectified image can be cut from this lens: its distortion folds back near the centre; calibrate it again"
+            "no rectified image can be cut from this lens: its distortion folds back near the center; calibrate it again"
         )
     low, high = low * share, high * share
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)

@@ -430,7 +430,7 @@ def by_other_calibration(
         imported: what is checked.
         other: a calibration known to be right.
         comparison: of the two.
-        judgement: on the comparison.
+        judgment: on the comparison.
         limits: that it was judged by.
         changed: no slip explains how the file misses its own check point, so none is guessed from a rough fit either.
     """

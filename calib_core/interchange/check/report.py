@@ -77,7 +77,7 @@ class CheckReport:
         imported: what was read.
         results: in the order of the checks.
         comparison: with the other calibration, if one was given.
-        judgement: on the comparison.
+        judgment: on the comparison.
         no_proof: codes of results that prove nothing, because they rest on a meaning that was assumed.
     """
 
@@ -292,7 +292,7 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
     distance_m = float(np.linalg.norm(camera_from_radar.translation_m))
     if distance_m > _FAR_M:
         message = f"the sensors are {distance_m:.4g} m apart"
-        results.append(CheckResult("warning", "far-apart", message, "is the translation in millimetres?"))
+        results.append(CheckResult("warning", "far-apart", message, "is the translation in millimeters?"))
     if not verified and _is_placeholder(camera_from_radar):
         message = "the camera is exactly at the radar's place, turned by exact right angles"
         results.append(CheckResult("warning", "placeholder", message, "is this the placeholder of a template?"))

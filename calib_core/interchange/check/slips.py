@@ -186,8 +186,8 @@ SLIPS: tuple[Slip, ...] = (
         "use the pose of the named frame; camera_link and its optical frame differ by a fixed rotation",
         _swap_axes,
     ),
-    Slip("millimetres", "the translation is in millimetres", "divide the translation by 1000", _divided_by(1000.0)),
-    Slip("centimetres", "the translation is in centimetres", "divide the translation by 100", _divided_by(100.0)),
+    Slip("millimetres", "the translation is in millimeters", "divide the translation by 1000", _divided_by(1000.0)),
+    Slip("centimetres", "the translation is in centimeters", "divide the translation by 100", _divided_by(100.0)),
     Slip(
         "position-for-translation",
         "the translation is the position c of the target frame's origin in the source frame, not t = -R c",
@@ -311,7 +311,7 @@ def explained(undone: UndoneSlips, mismatch: str) -> CheckResult:
 _FULL_DIGITS = 15
 _FLOAT_32 = 1e-6
 _HARMLESS_RAD, _HARMLESS_M = 2e-4, 1e-3
-_LARGEST = 0.02  # metres and radians: numbers such as 1 and 0.5 are usually not rounded
+_LARGEST = 0.02  # meters and radians: numbers such as 1 and 0.5 are usually not rounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,7 +330,7 @@ class Rounding:
 
     @property
     def is_harmless(self) -> bool:
-        """Whether it moves the pose by less than any calibration knows it: about 0.01 degrees and a millimetre."""
+        """Whether it moves the pose by less than any calibration knows it: about 0.01 degrees and a millimeter."""
         return self.angle_rad <= _HARMLESS_RAD and self.distance_m <= _HARMLESS_M
 
     def at(self, point_radar_m: Vector3, camera_from_radar: RigidTransform) -> float:

@@ -17,9 +17,9 @@ from calib_core.interchange.syntax.zip_archives import pack
 
 _NOTES = (
     "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar frame; "
-    "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
+    "COLMAP puts the center of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
-_WORLD = "the file does not say what its world frame is; taken to be the radar's (x forward, y left, z up), in metres"
+_WORLD = "the file does not say what its world frame is; taken to be the radar's (x forward, y left, z up), in meters"
 
 
 def _write(file: CalibrationFile) -> bytes:

@@ -14,7 +14,7 @@ from calib_core.interchange.trees.driveworks import POSE_KEY, recognizes_drivewo
 from calib_core.interchange.trees.posed_in_tree import read_joints
 
 _NOTES = (
-    "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
+    "nominalSensor2Rig_FLU is the sensor's pose in the rig: meters, roll-pitch-yaw in degrees about fixed axes, the camera with "
     "body axes (x forward, y left, z up); the radar is at the rig's origin unless its pose is given (--parent-from-radar)",
     "contains the pose only: copy the two poses into your own rig file; the check point, the evidence and the calibration's "
     "hash are in the camera's properties, as a text that DriveWorks does not read",

@@ -1,4 +1,4 @@
-"""Camera poses in the files of labelling services: Scale AI (frames and camera extrinsics) and Segments.ai (images)."""
+"""Camera poses in the files of labeling services: Scale AI (frames and camera extrinsics) and Segments.ai (images)."""
 
 from collections.abc import Mapping
 from typing import Any, Literal

@@ -69,7 +69,7 @@ K_RADAR_CAMERA = _refusing(
 )
 K_RADAR_OFFSET = _refusing(
     _is_k_radar_offset,
-    "K-Radar's offset between lidar and radar, x and y in metres without height or rotation, and no camera; give the 4x4 "
+    "K-Radar's offset between lidar and radar, x and y in meters without height or rotation, and no camera; give the 4x4 "
     "matrix that carries radar points into the camera",
 )
 KITTI_CAMERAS = _refusing(

@@ -52,7 +52,7 @@ _WORDS_OF_RADAR: dict[RadarAxes, str] = {
     "rfu": "radar x right, y forward, z up",
     "optical-like": "radar x right, y down, z forward",
 }
-_WORDS_OF_UNIT: dict[LengthUnit, str] = {"m": "metres", "mm": "millimetres", "cm": "centimetres"}
+_WORDS_OF_UNIT: dict[LengthUnit, str] = {"m": "meters", "mm": "millimeters", "cm": "centimeters"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -306,7 +306,7 @@ def _tilts_rad(camera_from_radar: RigidTransform) -> tuple[float, float]:
 def mounting_weight(camera_from_radar: RigidTransform) -> float:
     """Return how usual a mounting is, as an unnormalised density over attitudes and over the logarithm of the distance.
 
-    Most pairs of sensors look the same way, within about 20 degrees, upright, decimetres apart; a few look elsewhere.
+    Most pairs of sensors look the same way, within about 20 degrees, upright, decimeters apart; a few look elsewhere.
     """
     along, lean = _tilts_rad(camera_from_radar)
     upright = math.exp(-0.5 * (lean / _UPRIGHT_RAD) ** 2)

@@ -16,7 +16,7 @@ ImageSide = Annotated[int, Meta(ge=1, le=1_000_000)]
 
 
 class BoxDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A rectangle around an object: left, top, right, bottom; pixel (0, 0) is the centre of the top-left pixel.
+    """A rectangle around an object: left, top, right, bottom; pixel (0, 0) is the center of the top-left pixel.
 
     score is a detector's confidence; track is the same for one object in several frames.
     """

@@ -48,7 +48,7 @@ Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
 
 
 class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, rename={"chosen": "return"}):
-    """The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel.
+    """The reflector's center in one frame; pixel (0, 0) is the center of the top-left pixel.
 
     mark "untouched" is where the radar expected the reflector: no measurement, and not used. return is the radar return that
     a person chose for the click.
@@ -99,7 +99,7 @@ class RadarDocument(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PositionDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """A tape-measured camera centre in the radar frame: forward, left, up."""
+    """A tape-measured camera center in the radar frame: forward, left, up."""
 
     position_m: Position
     sigma_m: Positive = 0.03

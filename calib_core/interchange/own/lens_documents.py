@@ -28,7 +28,7 @@ class ImageSource(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The corners of the board in one image; (0, 0) is the centre of the top-left pixel."""
+    """The corners of the board in one image; (0, 0) is the center of the top-left pixel."""
 
     index: _Number
     name: Name

@@ -36,7 +36,7 @@ class PairsFile:
         sigma_range_m: of one radar position [m]; None if the file does not state it.
         sigma_azimuth_rad: the same for its azimuth [rad].
         sigma_elevation_rad: the same for its elevation [rad].
-        camera_position: the tape-measured camera centre; None if the file has none.
+        camera_position: the tape-measured camera center; None if the file has none.
         assumed: what a table does not state about units and axes, and was assumed.
     """
 

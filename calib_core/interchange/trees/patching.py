@@ -178,8 +178,8 @@ def _values(form: Form, parent_from_child: RigidTransform) -> np.ndarray:
 def _in_words(form: Form, values: np.ndarray) -> str:
     words = [number_text(value) for value in values.tolist()]
     if form == "rpy":
-        return f'xyz="{" ".join(words[:3])}" rpy="{" ".join(words[3:])}" (metres, radians)'
-    return f"x y z {' '.join(words[:3])} (metres), qx qy qz qw {' '.join(words[3:])}"
+        return f'xyz="{" ".join(words[:3])}" rpy="{" ".join(words[3:])}" (meters, radians)'
+    return f"x y z {' '.join(words[:3])} (meters), qx qy qz qw {' '.join(words[3:])}"
 
 
 def _refuse_other_reading(

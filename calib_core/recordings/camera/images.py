@@ -191,7 +191,7 @@ class ImageLayout:
         said = message.text("format")
         if "compressedDepth" in said:
             raise self._refused(
-                f"'{said}' is a depth image, not an image; choose a colour or grey image topic; {READABLE}"
+                f"'{said}' is a depth image, not an image; choose a color or grey image topic; {READABLE}"
             )
         try:
             if data.startswith(JPEG_MAGIC):

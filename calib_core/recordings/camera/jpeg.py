@@ -81,7 +81,7 @@ def _segments(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def png_size(data: bytes) -> tuple[int, int, int, int]:
-    """Return width, height, bits per channel and colour type of a PNG.
+    """Return width, height, bits per channel and color type of a PNG.
 
     Raises:
         MessageError: the header block is missing.

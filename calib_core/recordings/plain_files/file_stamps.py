@@ -65,7 +65,7 @@ class NamedTimes:
         times_ns: (n,) their times.
         zoneless: whether they are dates without a zone.
         assumed: what the digits after the second were taken for, if they do not say it; "" if they do.
-        disorder: how many neighbours in time have numbers in their names that run backwards.
+        disorder: how many neighbors in time have numbers in their names that run backwards.
     """
 
     places: tuple[int, ...]

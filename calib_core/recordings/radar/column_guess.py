@@ -63,7 +63,7 @@ _NEAREST_M, _FARTHEST_M = 4.0, 500.0
 _USUAL_M = 300.0
 """Of several units that fit, the one is likelier in which nothing lies farther away than this."""
 _NEAREST_METRES = 1.0
-"""Values in metres are believed to be metres from here on: in cm or mm they would all lie within a finger's width."""
+"""Values in meters are believed to be meters from here on: in cm or mm they would all lie within a finger's width."""
 _FASTEST_MPS = 150.0
 _FEW = 5
 _ENOUGH = 20
@@ -969,7 +969,7 @@ class PolarAgreement:
     Attributes:
         angle: the angle's unit.
         forward: the axis at angle 0, "x" or "y".
-        toward: 1 if the angle grows towards the positive other axis, -1 if away from it.
+        toward: 1 if the angle grows toward the positive other axis, -1 if away from it.
     """
 
     angle: Unit
@@ -1024,5 +1024,5 @@ def plan_described(
 
 
 def _is_too_far(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> bool:
-    """Return whether positions would be farther away than any radar sees if they were metres."""
+    """Return whether positions would be farther away than any radar sees if they were meters."""
     return farthest(*(column.values for column in columns if column.name in plan.position)) > FARTHEST_M

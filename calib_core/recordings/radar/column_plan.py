@@ -185,7 +185,7 @@ class ColumnPlan:
         claimed_scales: likewise for the claimed columns, to m and rad.
         doppler_scale: factor from the speed's columns to m/s.
         directions: where the message's own x, y and z point, if the user does not give axes.
-        described: the columns were recognised by what the message says about itself, not by the registry.
+        described: the columns were recognized by what the message says about itself, not by the registry.
         mapped: the quantities whose columns the user gave.
         other_azimuths: columns that may hold further azimuths of the same returns.
         azimuth_from: one of these, to read the positions at; None reads them at the first azimuth.
@@ -228,7 +228,7 @@ class ColumnPlan:
 
     @property
     def is_plain_xyz(self) -> bool:
-        """Return whether the position is that of columns x, y and z, in metres, forward, left and up."""
+        """Return whether the position is that of columns x, y and z, in meters, forward, left and up."""
         unchanged = (self.axes, self.mount, self.azimuth_from, self.scales, self.directions) == (
             None,
             None,
@@ -369,7 +369,7 @@ class StatedReading:
         return replace(self, column_map=tuple(found))
 
     def applied(self, plan: ColumnPlan | None) -> ColumnPlan | None:
-        """Return a plan with what the user states in place of what was recognised; None if there is neither."""
+        """Return a plan with what the user states in place of what was recognized; None if there is neither."""
         if plan is not None and self.axes is not None:
             plan = plan.read_as(self.axes)
         if not self.column_map:
@@ -399,7 +399,7 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     """Return the plan with the user's columns, units and signs in place of its own.
 
     Args:
-        plan: what was recognised; None if nothing was.
+        plan: what was recognized; None if nothing was.
         column_map: columns that exist.
 
     Raises:

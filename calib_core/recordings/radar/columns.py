@@ -1,4 +1,4 @@
-"""Recognise position, speed, amplitude and noise among the columns of a radar message, whatever their names."""
+"""Recognize position, speed, amplitude and noise among the columns of a radar message, whatever their names."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -86,7 +86,7 @@ def unknown(n: int, columns: int = 0) -> np.ndarray:
 
 
 def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
-    """Recognise the columns of a radar by their names; None if there is no position.
+    """Recognize the columns of a radar by their names; None if there is no position.
 
     Args:
         names: as the message spells them; nested ones dotted.

@@ -1,4 +1,4 @@
-"""Recognise radar layouts by a message's fields, never by the name of its package."""
+"""Recognize radar layouts by a message's fields, never by the name of its package."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

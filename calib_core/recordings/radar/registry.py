@@ -1,6 +1,6 @@
-"""The registry of radar layouts: how each is recognised, and what its values mean.
+"""The registry of radar layouts: how each is recognized, and what its values mean.
 
-A layout is recognised by the names of its fields, as the recording itself declares them, never by the name of a
+A layout is recognized by the names of its fields, as the recording itself declares them, never by the name of a
 package: three packages are called radar_msgs. If several match, the one with the most fields is used; a message
 that matches none is read by its column names alone (columns.py).
 """
@@ -27,7 +27,7 @@ _AWAY = "positive moving away"
 
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """One layout: how it is recognised, its axes, units and signs, and where its names mislead.
+    """One layout: how it is recognized, its axes, units and signs, and where its names mislead.
 
     Attributes:
         name: name for display.
@@ -148,7 +148,7 @@ _CLOUDS = (
         "nuScenes radar", "nuScenes samples/RADAR_*, .pcd (binary, version 0.7)", "cloud",
         _f("x y z dyn_prop id rcs vx vy vx_comp vy_comp is_quality_valid ambig_state x_rms y_rms invalid_state pdh0"),
         speed="from vx, vy along the line of sight", amplitude="dBsm",
-        note="z is always 0; the data set's default filters are off; x_rms and y_rms are classes, not metres",
+        note="z is always 0; the data set's default filters are off; x_rms and y_rms are classes, not meters",
     ),
     Decoder(
         "View-of-Delft radar", "View-of-Delft radar/*.bin (7 float32 each)", "cloud",
@@ -371,7 +371,7 @@ def _fault(added: Decoder, known: Iterable[Decoder]) -> str:
         if decoder.name == added.name:
             return "has the same name as another layout"
         if decoder.kind == added.kind and _folded(decoder.fields) == _folded(added.fields):
-            return f"is recognised by the same fields as {decoder.name!r}; it needs one more field to differ"
+            return f"is recognized by the same fields as {decoder.name!r}; it needs one more field to differ"
     return ""
 
 

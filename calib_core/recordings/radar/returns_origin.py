@@ -8,7 +8,7 @@ measured at the origin of their frame, and at the mount of the radar in it, by t
 * sides: an antenna sees what is in front of it, or it turns and sees everything;
 * Doppler: while the vehicle moves, the speeds of what stands still are one velocity along the lines of sight from the radar.
 
-Where no mount is known, or it explains nothing, the place is looked for: two neighbouring returns in one bin of range are equally
+Where no mount is known, or it explains nothing, the place is looked for: two neighboring returns in one bin of range are equally
 far from it, so it is on the plane between them.
 """
 
@@ -49,7 +49,7 @@ _STANDING_MPS = 0.1
 _MOST_STANDING = 0.1
 """With a larger share of returns without speed, the vehicle stands."""
 _FEWEST = 8
-"""Returns of a scan, for a velocity and a judgement of it."""
+"""Returns of a scan, for a velocity and a judgment of it."""
 _STEPS = 6
 _LEAST_MPS = 0.02
 """A speed is known no better."""
@@ -254,7 +254,7 @@ def _bins(points: Points3, step_m: float) -> float:
 
 
 def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:
-    """Return the place (3,) from which the most pairs of neighbouring returns are equally far, and the logarithm of how much
+    """Return the place (3,) from which the most pairs of neighboring returns are equally far, and the logarithm of how much
     likelier than by chance that is, less the same of the origin.
 
     Of a place that a few pairs make, all others meet by chance: of the planes within `_WIDE_M`, a share of `_PLANE_M / _WIDE_M`.

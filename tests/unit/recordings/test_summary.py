@@ -98,7 +98,7 @@ camera    /camera/image/compressed, frame 'camera': 20 images at 10.0 Hz, longes
 distortion -0.1, 0.02, 0.001, -0.002, 0.003
 
 warning   /radar/points has the same height (0 m) for every return: it measures no elevation.
-          put the reflector's centre at the radar's height at every placement, and measure the camera position. [flat-radar]"""
+          put the reflector's center at the radar's height at every placement, and measure the camera position. [flat-radar]"""
     )
 
 

@@ -29,7 +29,7 @@ _LEVEL_SIGNS = {
     "nothing": "–",
     "not judged": "–",
 }
-"""The level as a shape, for print without colour."""
+"""The level as a shape, for print without color."""
 _ROW = 15.0
 _GOOD_LIMITS = "10 cm and 1 deg"
 
@@ -194,7 +194,7 @@ _ANGLES = ("roll", "pitch", "yaw")
 
 
 def _sigmas(mounting: Mounting, calibration: Calibration) -> dict[str, float]:
-    """Return standard deviations by key, in centimetres and degrees; of a radar without elevation those that pairs determine."""
+    """Return standard deviations by key, in centimeters and degrees; of a radar without elevation those that pairs determine."""
     from calib_core.results.radar_axes import sigma_in_radar_axes
 
     places, angles = mounting.position_sigma_m.tolist(), mounting.roll_pitch_yaw_sigma_rad.tolist()

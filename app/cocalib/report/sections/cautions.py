@@ -39,7 +39,7 @@ def _no_warnings(subject: ReportSubject) -> str:
 
 
 def _all_warnings(subject: ReportSubject) -> Iterator[DataWarning]:
-    """Yield each warning once: of the calibration, of the judgement on the recording, of the recording."""
+    """Yield each warning once: of the calibration, of the judgment on the recording, of the recording."""
     own = by_consequence(subject.calibration.warnings) if subject.calibration is not None else _assumed(subject)
     judged = subject.judged.evaluation.warnings if subject.judged is not None else ()
     recorded = subject.recording.warnings if subject.recording is not None else ()

@@ -259,7 +259,7 @@ class McapSource(ChunkedSource):
         return offset + self.lead_bytes, size - records.MESSAGE_HEAD.size
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Recognise message records, which all have the same layout."""
+        """Recognize message records, which all have the same layout."""
         sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - records.MESSAGE_HEAD.size
         return (rows[:, 0] == records.MESSAGE) & (sizes >= 0) & (sizes <= records.MAX_RECORD_BYTES), sizes
 

@@ -167,7 +167,7 @@ class Rosbag1Source(ChunkedSource):
         )
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Recognise plain message records: a header of 38 bytes, with op=2 at the same offset as in the first record."""
+        """Recognize plain message records: a header of 38 bytes, with op=2 at the same offset as in the first record."""
         words = np.ascontiguousarray(rows[:, [0, 1, 2, 3, 42, 43, 44, 45]]).view("<u4")
         mark = rows[0].tobytes().find(b"op=\x02")
         usual = words[:, 0] == _MESSAGE_HEADER_BYTES

@@ -164,7 +164,7 @@ def unknown_unit_error(written: str, quantity: str, unit: str) -> RecordingError
 
 
 def time_name(written: str) -> TimeName | None:
-    """Recognise a column of times such as time_ns, header.stamp.sec or "Time [ms]"; None for any other."""
+    """Recognize a column of times such as time_ns, header.stamp.sec or "Time [ms]"; None for any other."""
     text, unit = split_unit(written)
     words = _words(text)
     name = _time(words) if unit else _with_time(words) or _time(words)

@@ -43,7 +43,7 @@ class ArrayLayout:
     def recognise(
         cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = NOTHING_STATED
     ) -> "ArrayLayout | None":
-        """Recognise a message by its arrays: by the registry, or by what they say about themselves."""
+        """Recognize a message by its arrays: by the registry, or by what they say about themselves."""
         names = [field.name for field in definition.fields if field.count and field.type in PRIMITIVES]
         decoder, plan = find_decoder("arrays", names), plan_for("arrays", names)
         if decoder is not None and plan is not None:

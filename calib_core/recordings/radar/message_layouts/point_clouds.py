@@ -49,7 +49,7 @@ def _no_known() -> dict[bytes, _Shape]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudLayout:
-    """Reads PointCloud2. The field description is parsed once, then recognised by its bytes."""
+    """Reads PointCloud2. The field description is parsed once, then recognized by its bytes."""
 
     definition: Definition
     plan: ColumnPlan
@@ -60,7 +60,7 @@ class CloudLayout:
 
     @classmethod
     def recognise(cls, samples: Samples, stated: StatedReading = NOTHING_STATED) -> "CloudLayout | None":
-        """Recognise the layout from a first message; None if it contains no positions."""
+        """Recognize the layout from a first message; None if it contains no positions."""
         definition, payload = samples.definition, samples.payload
         message = decode(definition, payload)
         dtype = _point_dtype(message, payload_byte_order(payload, definition))
@@ -69,7 +69,7 @@ class CloudLayout:
             return None
         plan = plan_for("cloud", dtype.names or ())
         whole = plan is not None and any(dtype[name].kind != "f" for name in plan.position)
-        if plan is None or not plan.decoder or whole:  # integers are hardly metres
+        if plan is None or not plan.decoder or whole:  # integers are hardly meters
             plan = plan_described("cloud", _cloud_columns(samples, dtype))
         plan = within.applied(plan)
         if plan is None:
@@ -328,7 +328,7 @@ class ChannelCloudLayout:
 
     @classmethod
     def recognise(cls, samples: Samples, stated: StatedReading = NOTHING_STATED) -> "ChannelCloudLayout | None":
-        """Recognise the layout from a first message."""
+        """Recognize the layout from a first message."""
         definition = samples.definition
         columns = _channel_columns(decode(definition, samples.payload))
         within = stated.within("", list(columns))

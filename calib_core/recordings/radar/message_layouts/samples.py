@@ -15,7 +15,7 @@ _STANDARD = "geometry_msgs/"
 
 
 class Samples:
-    """Messages of one topic, read only when a layout cannot be recognised by names alone.
+    """Messages of one topic, read only when a layout cannot be recognized by names alone.
 
     Args:
         definition: of the messages.

@@ -47,7 +47,7 @@ class PointLayout:
     def recognise(
         cls, definition: Definition, samples: Samples, stated: StatedReading = NOTHING_STATED
     ) -> "PointLayout | None":
-        """Recognise a radar return by its fields of fixed size: a position and a speed."""
+        """Recognize a radar return by its fields of fixed size: a position and a speed."""
         dtype, pins = fixed_part(definition, samples.payload)
         names = [name for name in dtype.names or () if not dtype[name].shape]
         strings = [field.name for field in definition.fields if field.type == "string"]

@@ -92,7 +92,7 @@ def test_an_absolute_path_stays_as_it_is(tmp_path):
             f"{ROW}camera_position_sigma_m = 0.1",
             "session 1 (a): camera_position_sigma_m: there is no camera_position_m",
         ),
-        (f"{ROW}camera_position_m = [0, 0, 5000]", "session 1 (a): camera_position_m: give metres"),
+        (f"{ROW}camera_position_m = [0, 0, 5000]", "session 1 (a): camera_position_m: give meters"),
         (f"{ROW}reflector_m = 24", "reflector_m"),
         (
             f'{ROW}[[session]]\nvehicle = "A"\nrecording = "c/B.bag"',

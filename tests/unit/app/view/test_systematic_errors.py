@@ -59,10 +59,10 @@ def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibra
 def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration):
     axes = (error("reflector_right_m", 0.05, 0.0), error("reflector_down_m", 0.04, 0.01))
     (row,) = systematic_errors(replace(calibration, systematic_errors=axes)).rows
-    assert ("phase centre" in row.figure.label, row.position_percent, row.rotation_percent) == (True, 9, 1)
+    assert ("phase center" in row.figure.label, row.position_percent, row.rotation_percent) == (True, 9, 1)
     apart = (replace(axes[0], sigma=0.01), axes[1])
     labels = [row.figure.label for row in systematic_errors(replace(calibration, systematic_errors=apart)).rows]
-    assert labels == ["clicks right of centre", "clicks below centre"]
+    assert labels == ["clicks right of center", "clicks below center"]
 
 
 def test_the_command_line_says_the_same_as_the_page(calibration):

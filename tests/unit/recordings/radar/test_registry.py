@@ -315,7 +315,7 @@ def test_a_layout_of_an_installed_package_decodes_its_messages(installed, ros2, 
                 'amplitude_field="loudness"',
                 '("Range", "azimuth", "elevation", "doppler_velocity", "amplitude"), doppler=None',
             ),
-            "is recognised by the same fields as 'radar_msgs scan'",
+            "is recognized by the same fields as 'radar_msgs scan'",
         ),
     ],
 )
