@@ -21,14 +21,10 @@ _KINDS: dict[MessageKind, str] = {
 
 
 def with_tables(page: str) -> str:
-    """Return the page with the layouts, notes, dates and columns as the registry and the readers have them."""
+    """Return the page with the layouts, dates and columns as the registry and the readers have them."""
     for kind, title in _KINDS.items():
         rows = _table([decoder for decoder in DECODERS if decoder.kind == kind])
         page = _replaced(page, f"## {title}\n\n", r"(?:(?!## ).*\n)*", [*rows, ""])
-    notes = [
-        f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed
-    ]
-    page = _replaced(page, "## Notes\n\n", r"(?:\*.*\n)*", notes)
     page = _replaced(page, "These are one moment:\n\n", r"(?:\*.*\n)*", [f"* `{date}`" for date in DATE_SPELLINGS])
     page = _replaced(page, "| quantity | spellings | units |\n|---|---|---|\n", r"(?:\|.*\n)*", _columns())
     return _replaced(page, "of a CSV names columns and units: ", r".*\n", [f"`{TABLE_EXAMPLE}` |"])
@@ -63,21 +59,22 @@ def _columns() -> tuple[str, ...]:
 
 def _table(decoders: list[Decoder]) -> list[str]:
     rows = [
-        "| layout | used by | position [m; angles as listed] | axes | angles | speed [m/s] | amplitude | noise |",
+        "| layout | used by | fields | position | angles | speed | amplitude | notes |",
         "|" + "---|" * 8,
     ]
-    rows += ["| " + " | ".join(_cells(decoder)) + " |" for decoder in decoders]
-    return [*rows, "", "Recognized by:", "", *(f"* {d.name}: `{' '.join(d.fields)}`" for d in decoders)]
+    return [*rows, *("| " + " | ".join(_cells(decoder)) + " |" for decoder in decoders)]
 
 
 def _cells(decoder: Decoder) -> tuple[str, ...]:
     plan = plan_for(decoder.kind, decoder.fields)
     assert plan is not None, f"{decoder.name} has no position"
-    speed = ", ".join(filter(None, (plan.doppler, decoder.speed)))
+    speed = ", ".join(filter(None, (plan.doppler, decoder.speed.removeprefix("positive moving away"))))
     amplitude = ", ".join(filter(None, (plan.amplitude, decoder.amplitude)))
+    noise = "" if decoder.noise == "none" else f"states its noise: {decoder.noise}"
     return (
-        decoder.name, decoder.source, ", ".join(plan.position), decoder.axes,
-        decoder.angles, speed, amplitude, decoder.noise,
+        decoder.name, decoder.source, f"`{' '.join(decoder.fields)}`", ", ".join(plan.position),
+        decoder.angles.replace(", since the message has positions", ""), speed, amplitude,
+        "; ".join(filter(None, (decoder.note, decoder.assumed, noise))),
     )  # fmt: skip
 
 

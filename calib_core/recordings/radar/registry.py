@@ -27,14 +27,13 @@ _AWAY = "positive moving away"
 
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """One layout: how it is recognized, its axes, units and signs, and where its names mislead.
+    """One layout: how it is recognized, its units and signs, and where its names mislead.
 
     Attributes:
         name: name for display.
         source: the packages or data sets that use it, with the message's name.
         kind: what the fields are fields of.
         fields: all are required; case does not matter. For lists, the fields of an element; nested ones dotted.
-        axes: where x, y and z point [m]; for polar messages after their conversion.
         angles: unit and signs of azimuth and elevation.
         speed: sign of the radial speed [m/s], or how it comes about.
         amplitude: unit of the amplitude.
@@ -59,7 +58,6 @@ class Decoder:
     source: str
     kind: MessageKind
     fields: tuple[str, ...]
-    axes: str = "x forward, y left, z up"
     angles: str = _NONE
     speed: str = _AWAY
     amplitude: str = "dB"
