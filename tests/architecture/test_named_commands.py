@@ -114,7 +114,7 @@ def test_what_a_user_must_know_stays_little(project_root: Path) -> None:
 
 
 def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At most 41,500 words without what a program writes: whole pages, rows of a registry, and shown output."""
+    """At most 35,000 words without what a program writes: whole pages, rows of a registry, and shown output."""
     monkeypatch.setattr("calib_core.interchange.formats.registry.FORMATS", ())
     monkeypatch.setattr("calib_core.recordings.radar.registry.DECODERS", ())
     makers = {
@@ -132,7 +132,7 @@ def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatc
             text = maker(text)
         if not re.search("written by `(python|make)", text[:900], re.IGNORECASE):
             words += len(re.sub(r"^```[^\n]*\n\$ (.*?)^```", "", text, flags=re.MULTILINE | re.DOTALL).split())
-    assert 20_000 < words <= 41_500
+    assert 20_000 < words <= 35_000
 
 
 _REMARK = re.compile(r"( \.\.\.)?(\s{3,}\S.*|\s+#.*|)$")
