@@ -71,7 +71,7 @@ class Case:
 CASES = {
     "independent 0.1 px": Case(),
     "independent 0.1 px, model chosen": Case(chosen=True),
-    "and 0.05 px shared by neighbours": Case(CornerErrors(shared_px=0.05)),
+    "and 0.05 px shared by neighbors": Case(CornerErrors(shared_px=0.05)),
     "and 0.5 % gross errors": Case(CornerErrors(gross_share=0.005)),
     "bent by 1.5 mm": Case(film=BoardFilm(bend_m=(0.0015, 0.0007))),
     "rolling shutter of 20 ms": Case(film=BoardFilm(rolling_shutter_s=0.02)),

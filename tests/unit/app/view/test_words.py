@@ -207,7 +207,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("two-poses", {**_AWAY, "probability": 0.2}),
     DataWarning("two-poses", {**_AWAY, "agreeing": ["c2", "c5"], "pairs": 9}),
     DataWarning("uncertain-association", {"ids": ["c2"]}),
-    DataWarning("units-suspected", {"nearest": 300.0, "farthest": 4000.0, "unit": "centimetres", "factor": 0.01}),
+    DataWarning("units-suspected", {"nearest": 300.0, "farthest": 4000.0, "unit": "centimeters", "factor": 0.01}),
     DataWarning("units-suspected", {"camera_away": 40.0}),
     DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0, "paper": True}),
     DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0}),
