@@ -38,8 +38,8 @@ _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
 _UNIT_SLIPS = (
-    ("position", "centimetres", 0.01),
-    ("position", "millimetres", 0.001),
+    ("position", "centimeters", 0.01),
+    ("position", "millimeters", 0.001),
     ("position", "feet", 0.3048),
     ("ranges", "feet", 1.0 / 0.3048),
 )

@@ -18,7 +18,7 @@ from calib_core.results.systematic_errors import OFF_MIDDLE, off_middle_px
 _FARTHEST_M = 100.0  # a reflector of a few decimetres is then a pixel or two wide
 _FARTHEST_CAMERA_M = 15.0
 _USUAL_RANGE_M = 8.0
-_UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
+_UNITS = {"millimeters": 0.001, "centimeters": 0.01, "feet": 0.3048}
 _SIDEWAYS_RAD = np.deg2rad(60.0)
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge

@@ -52,8 +52,8 @@ def found_in(
 @pytest.mark.parametrize(
     ("change", "code", "facts"),
     [
-        (lambda points, pixels: (1000.0 * points, pixels), "units-suspected", {"unit": "millimetres"}),
-        (lambda points, pixels: (100.0 * points, pixels), "units-suspected", {"unit": "centimetres"}),
+        (lambda points, pixels: (1000.0 * points, pixels), "units-suspected", {"unit": "millimeters"}),
+        (lambda points, pixels: (100.0 * points, pixels), "units-suspected", {"unit": "centimeters"}),
         (lambda points, pixels: (points, pixels[:, ::-1]), "pixels-suspected", {"exchanged": True}),
         (lambda points, pixels: (points, pixels / 2.0), "pixels-suspected", {"clicks": 20}),
         (
@@ -135,7 +135,7 @@ def test_a_unit_is_named_only_if_the_pairs_place_the_camera_clearly_away_from_th
         assert found["camera-position-contradicted"]["unit"] == ""
     found = found_in(simulated, *arrays(simulated), position_m=100.0 * simulated.rig.camera_position_radar_m)
     facts = found["camera-position-contradicted"]
-    assert (facts["misread"], facts["unit"]) == ("position", "centimetres")
+    assert (facts["misread"], facts["unit"]) == ("position", "centimeters")
 
 
 def changed(pair: Pair, **values: object) -> Pair:
