@@ -27,7 +27,7 @@ _PAGES = {
     "How to": "radar-formats intrinsics proposals evaluation boxes drift watch fleet report citing rerun simulation",
     "Concepts": "method conventions apex paper reliability security GLOSSARY",
     "Reference": "commands page python formats warnings",
-    "Project": "accuracy paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
+    "Project": "accuracy real paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
 _STYLES = (

@@ -1,0 +1,175 @@
+"""Solve a public set by three methods, and judge it by what its authors published."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.real.contents import Contents
+from calib_core import acc, pairs_from_arrays
+from calib_core.calibration import calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
+from calib_core.recordings import Recording, RecordingOptions, open_recording
+from calib_core.results import Calibration, Metrics
+from calib_core.results.metrics import distances
+from calib_core.results.verdict import verdict_on
+from cocalib.evaluation.boxes import find_boxes
+from cocalib.evaluation.evaluating import evaluate_recording
+from cocalib.session.state import Outcome
+from cocalib.solving.automatic import place_clicks, solve_placed_clicks
+from cocalib.solving.solving import required_camera, solve_clicks
+
+__all__ = ["METHODS", "TURNS_DEG", "Judged", "PoseFigures", "judged"]
+
+METHODS = ("ours", "Algorithm 1", "OpenCV")
+TURNS_DEG = (0.0, 1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PoseFigures:
+    """One method's pose.
+
+    Attributes:
+        rotation_deg: angle from the published rotation; NaN without one.
+        position_cm: distance of the camera centres.
+        error_px: mean reprojection error of all pairs, those set aside included.
+    """
+
+    rotation_deg: float
+    position_cm: float
+    error_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """The figures of one set.
+
+    Attributes:
+        pairs: their number.
+        set_aside: how many of them ours calls outliers.
+        poses: by method, or the code why it gave none.
+        published_px: mean reprojection error of all pairs under the published pose.
+        reach: distance of the published pose in our covariance, of the 95 % ellipsoid's radius: inside up to 1.
+        verdict: level of ours, or the code why there is no pose.
+        codes: of ours' warnings.
+        acc: of the published pose turned by `TURNS_DEG`, mean of yaw and pitch to both sides, 0 to 1.
+        returns: that Acc counts.
+    """
+
+    pairs: int = 0
+    set_aside: int = 0
+    poses: dict[str, PoseFigures | str] = field(default_factory=dict)
+    published_px: float = float("nan")
+    reach: float = float("nan")
+    verdict: str = ""
+    codes: tuple[str, ...] = ()
+    acc: tuple[float, ...] = ()
+    returns: int = 0
+
+
+def judged(contents: Contents, noise: NoiseOptions) -> Judged:
+    """Solve and judge what a set contains.
+
+    Raises:
+        CalibrationError: the recording cannot be read.
+    """
+    if contents.recording is None:
+        assert contents.camera is not None
+        pairs = pairs_from_arrays(contents.points_radar_m, contents.pixels_px, noise=noise)
+        camera = contents.camera
+        return _judged_poses(lambda options: calibrate_pairs(pairs, camera, options), camera, contents.published, noise)
+    options = RecordingOptions(confirm_assumptions=True)
+    with open_recording(contents.recording, options, require=("radar",)) as recording:
+        camera = contents.camera or required_camera(recording, None)
+        if contents.boxes is not None and contents.published is not None:
+            return _judged_boxes(contents.boxes, recording, camera, contents.published)
+        return _judged_poses(partial(_solved, recording, contents.clicks, camera), camera, contents.published, noise)
+
+
+def _solved(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], camera: Camera, options: CalibrationOptions
+) -> Outcome:
+    """Solve a recording by its clicks, or without any."""
+    if clicks:
+        return solve_clicks(recording, clicks, camera, options)
+    placed = place_clicks(recording, camera, options)
+    return placed if isinstance(placed, Unsolvable) else solve_placed_clicks(recording, placed, camera, options)
+
+
+def _judged_poses(
+    solve: Callable[[CalibrationOptions], Outcome],
+    camera: Camera,
+    published: RigidTransform | None,
+    noise: NoiseOptions,
+) -> Judged:
+    """Solve by the three methods; OpenCV gets the radar positions of ours."""
+    ours = solve(CalibrationOptions(noise=noise))
+    if isinstance(ours, Unsolvable):
+        return Judged(verdict=ours.code)
+    points = np.array([pair.point_radar_m for pair in ours.pairs])
+    pixels = np.array([pair.pixel_px for pair in ours.pairs])
+    poses: dict[str, PoseFigures | str] = {
+        "ours": _figures(ours.camera_from_radar, published, distances(ours.reproject(points), pixels))
+    }
+    paper = solve(CalibrationOptions(method="paper"))
+    if isinstance(paper, Unsolvable):
+        poses["Algorithm 1"] = paper.code
+    else:
+        spread_px = np.array([pair.distance_px for pair in paper.pairs])
+        poses["Algorithm 1"] = _figures(paper.camera_from_radar, published, spread_px)
+    ransac = solve_pnp_ransac(points, pixels, camera, "sqpnp")
+    if ransac is not None:
+        kept = ransac.inliers
+        pose = refine_lm(points[kept], pixels[kept], camera, ransac.camera_from_radar) or ransac.camera_from_radar
+        poses["OpenCV"] = _figures(pose, published, distances(camera.project(pose @ points), pixels))
+    return Judged(
+        pairs=len(ours.pairs),
+        set_aside=sum(not pair.inlier for pair in ours.pairs),
+        poses=poses,
+        published_px=float(distances(camera.project(published @ points), pixels).mean()) if published else np.nan,
+        reach=_reach(ours, published) if published else np.nan,
+        verdict=verdict_on(ours).level,
+        codes=tuple(dict.fromkeys(warning.code for warning in ours.warnings)),
+    )
+
+
+def _figures(pose: RigidTransform, published: RigidTransform | None, distances_px: np.ndarray) -> PoseFigures:
+    error_px = float(distances_px.mean())
+    if published is None:
+        return PoseFigures(np.nan, np.nan, error_px)
+    turned = np.linalg.norm(published.error_from(pose)[3:])
+    apart_m = np.linalg.norm(pose.inverse().translation_m - published.inverse().translation_m)
+    return PoseFigures(float(np.rad2deg(turned)), float(100.0 * apart_m), error_px)
+
+
+def _reach(ours: Calibration, published: RigidTransform) -> float:
+    error = published.error_from(ours.camera_from_radar)
+    return float(np.sqrt(error @ np.linalg.solve(ours.covariance, error) / ours.covariance_quantile))
+
+
+def _judged_boxes(boxes: Path, recording: Recording, camera: Camera, published: RigidTransform) -> Judged:
+    """Count the returns in boxes under the published pose, and turned."""
+    drawn = find_boxes(str(boxes), recording)
+    unknown = np.full((6, 6), np.nan)
+    stated = Calibration(published, unknown, camera, Metrics(), (), (), (), CalibrationOptions())
+    figures = evaluate_recording(stated, recording, boxes=drawn).boxes
+    counted = None if figures is None else figures.returns
+    if counted is None:
+        return Judged(verdict="no returns in boxes")
+    low, high = counted.boxes_px[:, :2], counted.boxes_px[:, 2:]
+
+    def share(turn_rad: np.ndarray) -> float:
+        turned = RigidTransform(rotation_exp(turn_rad), np.zeros(3)) @ published
+        pixels = camera.project(turned @ counted.points_radar_m)
+        inside = np.asarray(((pixels >= low) & (pixels <= high)).all(axis=1))
+        return acc([inside[counted.frames == frame] for frame in np.unique(counted.frames)]) or 0.0
+
+    axes = np.concatenate([np.eye(3)[:2], -np.eye(3)[:2]])  # pitch and yaw, to both sides
+    shares = tuple(float(np.mean([share(np.deg2rad(degrees) * axis) for axis in axes])) for degrees in TURNS_DEG)
+    return Judged(acc=shares, returns=len(counted.targets))

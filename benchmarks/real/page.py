@@ -1,0 +1,155 @@
+"""Write docs/real.md and the table of figures from what was judged."""
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from benchmarks.real.contents import RealSet
+from benchmarks.real.judging import METHODS, TURNS_DEG, Judged, PoseFigures
+
+__all__ = ["Outcomes", "page", "set_table", "table_csv"]
+
+Outcomes = Mapping[RealSet, Judged | str]
+"""What was judged, or why it was not."""
+
+_HEAD = """# Real recordings
+
+Written by `python -m benchmarks.real --data FOLDER --write`; do not edit.
+
+Recordings and pairs that others published, solved as a user would, and compared with the extrinsics that they published. Nothing
+of them is shipped. FOLDER holds their checkouts ([below](#checkouts)); `--only NAME` runs one row, and a set that is not there is
+said in its row. `python -m benchmarks.real --list` needs no data. A further set is a row in `benchmarks/real/sets.py`.
+
+- **Ours** is the default method with default options, but where [a row](#the-sets) names the noise. **Algorithm 1** is the
+  paper's (`--method paper`). **OpenCV** is RANSAC with SQPnP (8 px), then Levenberg-Marquardt on its inliers, from the radar
+  positions that ours chose.
+- Each has its angle from the published rotation, the distance of the two camera positions, and the mean reprojection error of all
+  pairs, those that the method sets aside included. Least squares on all pairs makes that error small; it does not judge the pose.
+- **Published**: the mean reprojection error of the published pose.
+- **Inside**: whether the published pose is in our 95 % ellipsoid, and how far out it is in the ellipsoid's radius. It is a
+  measurement with [errors of its own](#the-sets), so a right estimate may have it outside.
+- **Verdict**: its level, or the code of the refusal, and the codes of the [warnings](warnings.md).
+"""
+_ACC = """## Returns in boxes
+
+[Acc](evaluation.md) of the published pose, and of the same pose turned: the mean of pitch and yaw, to both sides.
+"""
+_SETS = """## The sets
+
+The licence is what the repository states; where it states none, only these figures are taken from it. Figures in full:
+`benchmarks/real/results.csv`.
+"""
+
+
+def page(outcomes: Outcomes) -> str:
+    """Return the page."""
+    with_boxes = {row: judged for row, judged in outcomes.items() if isinstance(judged, Judged) and judged.acc}
+    posed = {row: judged for row, judged in outcomes.items() if row not in with_boxes}
+    head = ("set", "pairs", *METHODS, "published", "inside", "verdict and warnings")
+    turns = ("as published" if not degrees else f"{degrees:g} deg" for degrees in TURNS_DEG)
+    parts = [
+        *(_HEAD, _table(head, (_pose_cells(row, judged) for row, judged in posed.items()))),
+        *(_ACC, _table(("set", "returns", *turns), (_acc_cells(row, judged) for row, judged in with_boxes.items()))),
+        *(_SETS, _reference_table(outcomes)),
+        *("### Checkouts\n", "```", *dict.fromkeys(row.clone for row in outcomes), "```\n"),
+    ]
+    return "\n".join(parts)
+
+
+def set_table(rows: Sequence[RealSet]) -> str:
+    """Return where each set is, and what is read."""
+    head = ("set", "what", "where", "licence", "reads", "sha256")
+    cells = (
+        (row.name, row.what, f"{row.repository}@{row.commit[:7]}", row.licence, " ".join(row.files), row.sha256[:12])
+        for row in rows
+    )
+    return _table(head, cells)
+
+
+def _reference_table(rows: Iterable[RealSet]) -> str:
+    """Say what is wrong with each reference, once for the sets that share it."""
+    names: dict[tuple[str, ...], list[str]] = {}
+    for row in rows:
+        where = f"[{row.repository.partition('/')[0]}](https://github.com/{row.repository})"
+        names.setdefault((row.what, where, row.licence, row.bias), []).append(row.name)
+    head = ("set", "what", "where", "licence", "reference")
+    return _table(head, ((", ".join(alike), *cells) for cells, alike in names.items()))
+
+
+def table_csv(outcomes: Outcomes) -> str:
+    """Return all figures, one line per set."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    of_poses = [f"{method} {unit}" for method in METHODS for unit in ("deg", "cm", "px")]
+    of_acc = [f"acc {degrees:g} deg" for degrees in TURNS_DEG]
+    last = ("published px", "reach", "verdict", "codes", *of_acc, "returns", "not run")
+    writer.writerow(("set", "commit", "pairs", "set aside", *of_poses, *last))
+    for row, judged in outcomes.items():
+        if isinstance(judged, str):
+            writer.writerow((row.name, row.commit, *[""] * (len(of_poses) + 6 + len(of_acc) + 1), judged))
+            continue
+        figures = [value for method in METHODS for value in _values(judged, method)]
+        shares = [*judged.acc, *[np.nan] * (len(TURNS_DEG) - len(judged.acc))]
+        numbers = [_number(value) for value in (*figures, judged.published_px, judged.reach)]
+        said = (judged.verdict, " ".join(judged.codes))
+        writer.writerow(
+            (
+                row.name,
+                row.commit,
+                judged.pairs,
+                judged.set_aside,
+                *numbers,
+                *said,
+                *map(_number, shares),
+                judged.returns,
+                "",
+            )
+        )
+    return text.getvalue()
+
+
+def _values(judged: Judged, method: str) -> tuple[float, float, float]:
+    figures = judged.poses.get(method)
+    return (
+        (np.nan,) * 3
+        if not isinstance(figures, PoseFigures)
+        else (figures.rotation_deg, figures.position_cm, figures.error_px)
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else ""
+
+
+def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
+    if isinstance(judged, str):
+        return (row.name, "", judged, "", "", "", "", "")
+    aside = f", {judged.set_aside} set aside" if judged.set_aside else ""
+    inside = (
+        "no reference"
+        if not np.isfinite(judged.reach)
+        else f"{'yes' if judged.reach <= 1.0 else '**no**'}, {judged.reach:.2f}"
+    )
+    codes = " ".join(f"`{code}`" for code in judged.codes)
+    methods = (_pose_cell(judged, method) for method in METHODS)
+    published = f"{judged.published_px:.1f} px" if np.isfinite(judged.published_px) else ""
+    return (row.name, f"{judged.pairs}{aside}", *methods, published, inside, f"{judged.verdict} {codes}".strip())
+
+
+def _pose_cell(judged: Judged, method: str) -> str:
+    figures = judged.poses.get(method, "none")
+    if isinstance(figures, str):
+        return figures
+    degrees, cm, px = _values(judged, method)
+    return f"{px:.1f} px" if not np.isfinite(degrees) else f"{degrees:.2f} deg, {cm:.1f} cm, {px:.1f} px"
+
+
+def _acc_cells(row: RealSet, judged: Judged) -> tuple[str, ...]:
+    return (row.name, str(judged.returns), *(f"{100.0 * share:.1f} %" for share in judged.acc))
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    return "\n".join([*lines, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"
