@@ -6,7 +6,8 @@ from pathlib import Path
 
 from calib_core.recordings.field_words import SPELLINGS, TABLE_ANGLES, units_for
 from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE, TIME_SPELLINGS
-from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind, plan_for
+from calib_core.recordings.radar.column_guess import plan_names
+from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
 from calib_core.recordings.time.written_times import DATE_SPELLINGS
 
 PAGE = Path(__file__).parent / "radar-formats.md"
@@ -66,7 +67,7 @@ def _table(decoders: list[Decoder]) -> list[str]:
 
 
 def _cells(decoder: Decoder) -> tuple[str, ...]:
-    plan = plan_for(decoder.kind, decoder.fields)
+    plan = plan_names(decoder.kind, decoder.fields)
     assert plan is not None, f"{decoder.name} has no position"
     speed = ", ".join(filter(None, (plan.doppler, decoder.speed.removeprefix("positive moving away"))))
     amplitude = ", ".join(filter(None, (plan.amplitude, decoder.amplitude)))

@@ -145,9 +145,9 @@ radial 0: range rate; rangerate; v doppler; v rad; vel rad; velocity rad; speed 
 radial 0: range velocity; v r; vr; vel r; velocity r; speed r; dist rate; distance rate; range speed; vrad; rr; dop; dop vel
 radial 0: dop velocity
 doppler 4: velocity; speed; vel; spd; v
-vx 0: vx; v x; vel x; velocity x; speed x; x dot; xdot; long vel; long velocity; v long; vlong; long speed
-vy 0: vy; v y; vel y; velocity y; speed y; y dot; ydot; lat vel; lat velocity; v lat; vlat; lat speed
-vz 0: vz; v z; vel z; velocity z; speed z; z dot; zdot; vertical vel; vertical velocity; vertical speed
+vx 0: vx; v x; vel x; velocity x; speed x; x dot; xdot; long vel; long velocity; v long; vlong; long speed; twist linear x
+vy 0: vy; v y; vel y; velocity y; speed y; y dot; ydot; lat vel; lat velocity; v lat; vlat; lat speed; twist linear y
+vz 0: vz; v z; vel z; velocity z; speed z; z dot; zdot; vertical vel; vertical velocity; vertical speed; twist linear z
 snr 0: snr; signal noise ratio; signal to noise; signal to noise ratio; signaltonoise; signaltonoiseratio; snr ratio
 intensity 1: intensity; intens
 rcs 2: rcs; radar cross section; cross section
@@ -215,14 +215,14 @@ STATISTICS = words_in("std stddev stdev sigma rms dev deviation")
 BLOCKERS = words_in(
     "var variance cov covariance err error unc uncertainty accuracy acc conf confidence quality valid invalid flag flags "
     "min max maximum minimum res resolution bin idx index id ids count cnt num number offset bias scale limit accel "
-    "acceleration origin ref reference prev previous pred predicted ambiguous ambig ambiguity gate width length size "
+    "acceleration origin ref reference prev previous pred predicted gate width length size "
     "time age status type class classification prob probability fov orient orientation heading yaw pitch roll "
     "start end ego host abs absolute delta diff lever mount mounting install vehicle odom state mode threshold thresh "
     "existence history covar turn steer steering lane road boundary corner curvature dynamic property dyn prop"
 )
 """Words that make a name mean something else."""
 
-SECOND = words_in("2 3 second secondary alt alternative alternate hyp2 amb other")
+SECOND = words_in("2 3 second secondary alt alternative alternate hyp2 amb ambig ambiguity ambiguous other")
 """Words that make a quantity a second hypothesis."""
 
 NUMBERS = frozenset(("1", "0", "first", "primary", "hyp", "hypothesis"))
@@ -363,6 +363,11 @@ def pixel_axis(name: str) -> str:
 def meaning_of(name: str) -> Meaning | None:
     """Return what the dotted name of a message's field means; None if it is none of the quantities in use."""
     return _meaning(words_of(name), _SPELT_IN_MESSAGES, TYPE_PREFIXES)
+
+
+def names_a_speed(names: Iterable[str]) -> bool:
+    """Return whether a column's name says that it is a radial speed, which only a radar or a rare lidar measures."""
+    return any(meaning is not None and meaning.kind == "radial" for meaning in map(meaning_of, names))
 
 
 @cache

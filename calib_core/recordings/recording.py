@@ -28,7 +28,7 @@ from calib_core.recordings.plain_files.opening import files_behind, open_plain_s
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource
 from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
-from calib_core.recordings.radar.column_plan import ColumnReading, column_readings, parse_radar_axes
+from calib_core.recordings.radar.column_plan import ColumnReading, parse_radar_axes
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.returns_origin import ReturnsOrigin
 from calib_core.recordings.radar.scan_stream import Losses
@@ -186,7 +186,7 @@ class Recording:
     @property
     def radar_columns(self) -> tuple[ColumnReading, ...]:
         """What was taken for what in the radar's messages; empty without a radar."""
-        return column_readings(self._assembly.radar.layout.plan) if self._assembly.radar else ()
+        return self._assembly.radar.layout.plan.readings if self._assembly.radar else ()
 
     @property
     def radar_notes(self) -> tuple[str, ...]:

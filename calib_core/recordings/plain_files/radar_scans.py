@@ -10,9 +10,9 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
+from calib_core.recordings.field_words import names_a_speed
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
-from calib_core.recordings.radar.columns import names_a_speed
 
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28

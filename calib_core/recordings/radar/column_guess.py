@@ -1,21 +1,20 @@
 """Decide which column of a radar is which quantity in which unit, or refuse with the --map to type.
 
-The one place for it: messages that no registry knows, clouds with unusual fields, tables of CSV and JSON. Names, comments and
---map state what columns are, values show it. What nothing states is an assumption; where a table's values fit two units alike,
-it is refused.
+The one place for it: messages, clouds, tables of CSV and JSON. --map, the registry's layouts, names and comments state what
+columns are, values show it. What nothing states is an assumption; where a table's values fit two units alike, it is refused.
 """
 
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 
 from calib_core.arrays import Values
-from calib_core.errors import RecordingError
+from calib_core.errors import OptionError, RecordingError
 from calib_core.recordings.containers.sources import CONFIRM_ALL, Assumption
 from calib_core.recordings.field_words import (
     OPPOSITE,
@@ -46,8 +45,7 @@ from calib_core.recordings.radar.column_plan import (
     RadarAxes,
     StatedReading,
 )
-from calib_core.recordings.radar.columns import plan_columns
-from calib_core.recordings.radar.registry import MessageKind, find_decoder, plan_for
+from calib_core.recordings.radar.registry import NO_QUANTITY, Decoder, MessageKind, find_decoder
 
 _T = TypeVar("_T")
 Rules: TypeAlias = Literal["message", "ros", "table"]
@@ -74,6 +72,7 @@ _ALIKE_RAD = 0.02
 _MOST_SENSORS = 8
 _AXIS_WORDS = words_in("x y z long lat vertical height altitude dx dy dz px py pz dlong dlat vx vy vz vlong vlat")
 _AXES = {"x": "y", "y": "x"}
+_OF_POSITIONS = words_in("pose position pos point")
 _PLANES = {"forward": 0, "backward": 0, "left": 1, "right": 1, "up": 2, "down": 2}
 _AS_MAPPED = {
     "forward": ("x", ""), "backward": ("x", "-"), "left": ("y", ""), "right": ("y", "-"), "up": ("z", ""), "down": ("z", "-"),
@@ -126,6 +125,7 @@ class ColumnMatch:
         why: where the unit is stated; "" if it is not.
         plain: a table's column with the name of the documentation, whose axes are those of the documentation.
         mapped: the --map that chose it; None if its name did.
+        named: whether its name says so.
     """
 
     column: DescribedColumn
@@ -134,6 +134,7 @@ class ColumnMatch:
     why: str
     plain: bool = False
     mapped: MappedColumn | None = None
+    named: bool = True
 
     @property
     def sign(self) -> int:
@@ -187,8 +188,8 @@ def guess_columns(
     remarks: str = "",
     *,
     rules: Rules = "message",
-    known: bool = False,
     stated: StatedReading = NOTHING_STATED,
+    decoder: Decoder | None = None,
 ) -> ColumnPlan | None:
     """Plan the columns of a radar by names, comments and values; None if they do not look like a radar's.
 
@@ -196,53 +197,68 @@ def guess_columns(
         columns: the numbers of one return.
         remarks: comments of the definition that belong to no field.
         rules: what defines the units and axes that the columns do not state.
-        known: it is a radar's, or anything with positions will do.
-        stated: what the user states about a table; of messages it is applied to the plan.
+        stated: what the user states.
+        decoder: the layout of the registry that the message has; None if it has none.
 
     Raises:
         RecordingError: the values of a table fit two units alike; the message has the --map that says which.
+        OptionError: the user maps half a position, or the time of a message.
     """
-    chosen = choose(columns, rules, stated)
+    chosen = choose(columns, rules, stated, decoder)
     matched = chosen.matched
-    if not known and not _looks_like_radar(matched):
+    if rules == "message" and not decoder and not stated.column_map and not _looks_like_radar(matched):
         return None
     cartesian, polar = {"x", "y"} <= matched.keys(), {"range", "azimuth"} <= matched.keys()
     unfilled = cartesian and not (matched["x"].column.filled or matched["y"].column.filled)
-    guess = _UnitInference(chosen, remarks, rules, stated)
+    guess = _UnitInference(chosen, remarks, rules, stated, decoder)
     if cartesian and not (polar and unfilled):
         plan = guess.cartesian()
     elif polar:
         plan = guess.polar()
     else:
+        _refuse_half_a_position(stated, matched, rules)
         return None
     return guess.flags(guess.amplitude(guess.speed(guess.noise(plan))), columns)
+
+
+def _refuse_half_a_position(stated: StatedReading, matched: Collection[str], rules: Rules) -> None:
+    """Refuse a --map of a message that has no position with it.
+
+    Raises:
+        OptionError: it has not.
+    """
+    given = {one.quantity for one in stated.column_map}
+    if not given or rules == "table":
+        return
+    whole = next((pair for pair in (("x", "y"), _POLAR[:2]) if not given.isdisjoint(pair)), ())
+    for quantity in whole:
+        if quantity not in matched:
+            raise OptionError(
+                f"--map: {quantity} is not known; add --map {quantity}=COLUMN:{units_for(quantity)[0].flag}"
+            )
+    raise OptionError("--map: say where the position is: x and y, or range and azimuth")
 
 
 def _looks_like_radar(matched: Mapping[str, ColumnMatch]) -> bool:
     """Return whether there is a position, and something that only radars measure."""
     if {"range", "azimuth"} <= matched.keys():
         return True
+    if not {"x", "y"} <= matched.keys():
+        return False
     amplitude = "amplitude" in matched and matched["amplitude"].meaning.rank != 1
-    radial = "doppler" in matched and matched["doppler"].meaning.kind == "radial"
-    return {"x", "y"} <= matched.keys() and (amplitude or radial or {"vx", "vy"} <= matched.keys())
-
-
-def fill_in(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
-    """Add the speed and the amplitude that a plan made by plain names lacks, and a second hypothesis of the azimuth."""
-    chosen = choose(columns)
-    speed, level = chosen.matched.get("doppler"), chosen.matched.get("amplitude")
-    if plan.doppler is None and not plan.velocity and speed is not None and speed.meaning.kind == "radial":
-        plan = replace(plan, doppler=speed.name, doppler_scale=speed.unit.scale if speed.unit else 1.0)
-    if plan.amplitude is None and level is not None:
-        plan = replace(plan, amplitude=level.name, amplitude_scale=level.unit.scale if level.unit else 1.0)
-    return replace(plan, other_azimuths=chosen.other_azimuths)
+    plain = matched["x"].meaning.rank == 0 and _OF_POSITIONS.issuperset(matched["x"].stem)
+    speed = "doppler" in matched and (plain or matched["doppler"].meaning.kind == "radial")
+    return amplitude or speed or {"vx", "vy"} <= matched.keys()
 
 
 def choose(
-    columns: Sequence[DescribedColumn], rules: Rules = "message", stated: StatedReading = NOTHING_STATED
+    columns: Sequence[DescribedColumn],
+    rules: Rules = "message",
+    stated: StatedReading = NOTHING_STATED,
+    decoder: Decoder | None = None,
 ) -> ColumnChoice:
     """Choose a column for each quantity."""
-    matches = _matches_of_table(columns, stated) if rules == "table" else _matches_of_message(columns)
+    matches = _matches(columns, rules, stated, decoder)
     matches.sort(key=lambda one: one.order)
     matched: dict[str, ColumnMatch] = {}
     sigma: dict[str, ColumnMatch] = {}
@@ -253,9 +269,13 @@ def choose(
             matched.setdefault(one.quantity, one)
     first = [one for one in matches if not one.meaning.sigma and not one.meaning.second]
     matched |= _columns_of_one_position(first, ("x", "y", "z")) | _columns_of_one_position(first, ("vx", "vy", "vz"))
-    second = (one for one in matches if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
-    others = tuple(one.name for one in second) if "azimuth" in matched else ()
-    vague = [one for one in first if one.meaning.kind == "vague"]
+    numbered = [one for one in matches if one.meaning.numbered and one.quantity == "azimuth" and not one.meaning.sigma]
+    azimuth = matched.get("azimuth")
+    second = [one for one in numbered if one.meaning.second or one.meaning.kind != "vague"]
+    has_first = azimuth is not None or {"x", "y"} <= matched.keys()
+    others = tuple(one.name for one in second if has_first and one is not azimuth)
+    stating = any(one.mapped and one.quantity in _POLAR for one in matches)
+    vague = [one for one in first if one.meaning.kind == "vague" and not stating]
     assigned = _assign_vague_angles(vague, matched)
     used = [value.name for value in matched.values()]
     unused = tuple(one.name for one in vague if one.name not in used)
@@ -268,16 +288,52 @@ def choose(
     return ColumnChoice(matched, sigma, assigned, others, () if "elevation" in matched else (*unused, *heights), rivals)
 
 
-def _matches_of_message(columns: Sequence[DescribedColumn]) -> list[ColumnMatch]:
-    """Return the columns that mean something; none if one of them is not a radar's."""
-    if any(has_word(column.name, *_NOT_RADARS) for column in columns):
-        return []
-    matches = [
-        one for one in (_match(column, name) for column, name in _without_common_word(columns)) if one is not None
-    ]
-    if any(has_word(column.name, *_SIZES) for column in columns):
-        matches = [matched for matched in matches if not has_word(matched.name, "height")]  # of an object
-    return matches
+def _matches(
+    columns: Sequence[DescribedColumn], rules: Rules, stated: StatedReading, decoder: Decoder | None
+) -> list[ColumnMatch]:
+    """Return the columns that --map and the registry choose, and of other quantities those whose names mean something."""
+    given = {one.column: one for one in stated.column_map}
+    taken = {value.quantity for value in given.values()}
+    own = {} if decoder is None else {name.lower(): what for what, name in decoder.columns.items() if what not in taken}
+    taken.update(own.values())
+    if not taken.isdisjoint(_POLAR[:2]) and taken.isdisjoint("xy"):
+        taken |= set("xyz")  # it is said what to use
+    of_table = rules == "table"
+    meanings = _meanings_in_table(columns, stated) if of_table else _meanings_in_message(columns, rules, decoder)
+    found = []
+    for column, meaning in zip(columns, meanings, strict=True):
+        one, quantity, named = given.get(column.name), own.get(column.name.lower(), ""), True
+        if one or quantity:
+            quantity = one.quantity if one else quantity
+            bare = quantity.removeprefix("sigma_")
+            named = quantity in own.values() or (meaning is not None and meaning.quantity == bare)
+            unit = _unit(one.unit) if one and one.unit else meaning.unit if meaning and named else None
+            meaning = Meaning(bare, -1, unit, sigma=bare != quantity)
+            column = replace(column, values=one.sign * column.values) if one else column
+        elif meaning is None or f"{'sigma_' * meaning.sigma}{meaning.quantity}" in taken:
+            continue
+        why = f"--map {one.words}" if one else "name"
+        if meaning.unit is None and not of_table:
+            unit = unit_in(column.comment, dimension_of(meaning.quantity), integer=column.integer)
+            meaning, why = replace(meaning, unit=unit), _COMMENT
+        plain = one is not None or is_plain(split_unit(column.name)[0], meaning)
+        found.append(ColumnMatch(column, meaning, meaning.unit, why if meaning.unit else "", plain, one, named))
+    return found
+
+
+def _meanings_in_message(
+    columns: Sequence[DescribedColumn], rules: Rules, decoder: Decoder | None
+) -> list[Meaning | None]:
+    """Return what the names of fields mean; nothing if one of them is not a radar's."""
+    foreign = rules == "message" and not decoder and any(has_word(column.name, *_NOT_RADARS) for column in columns)
+    of_objects = any(has_word(column.name, *_SIZES) for column in columns)
+    found: list[Meaning | None] = []
+    for column, name in _without_common_word(columns):
+        meaning = None if foreign else meaning_of(name) or meaning_of(column.name)
+        if meaning and meaning.kind == "vague" and (angle := angle_in(column.comment)):
+            meaning = replace(meaning, kind=angle)
+        found.append(None if of_objects and has_word(column.name, "height") else meaning)
+    return found
 
 
 def _without_common_word(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
@@ -290,48 +346,18 @@ def _without_common_word(columns: Sequence[DescribedColumn]) -> list[tuple[Descr
     ]
 
 
-def _match(column: DescribedColumn, name: str) -> ColumnMatch | None:
-    meaning = meaning_of(name) or meaning_of(column.name)
-    if meaning is None:
-        return None
-    if meaning.kind == "vague" and (angle := angle_in(column.comment)):
-        meaning = replace(meaning, kind=angle)
-    if meaning.unit is not None:
-        return ColumnMatch(column, meaning, meaning.unit, "name")
-    unit = unit_in(column.comment, dimension_of(meaning.quantity), integer=column.integer)
-    return ColumnMatch(column, meaning, unit, _COMMENT if unit else "")
-
-
-def _matches_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[ColumnMatch]:
-    """Return the columns that --map chooses, and of the other quantities those whose names mean something."""
-    given = {one.column: one for one in stated.column_map}
-    taken = {value.quantity for value in given.values()}
-    if not taken.isdisjoint(_POLAR[:2]) and taken.isdisjoint("xy"):
-        taken |= set("xyz")  # the user says what to use
-    found = []
+def _meanings_in_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[Meaning | None]:
+    """Return what the names of a table's columns mean; a stated unit is preferred to a plainer name."""
+    degrees, found = stated.axes.degrees if stated.axes else None, []
     for column in columns:
-        one, meaning = given.get(column.name), table_meaning(column.name, column.comment)
-        if one:
-            quantity = one.quantity.removeprefix("sigma_")
-            same = meaning is not None and meaning.quantity == quantity
-            unit = _unit(one.unit) if one.unit else meaning.unit if meaning and same else None
-            meaning = Meaning(quantity, -1, unit, sigma=quantity != one.quantity)
-            column = replace(column, values=one.sign * column.values)
-        if meaning is None or (not one and f"{'sigma_' * meaning.sigma}{meaning.quantity}" in taken):
-            continue
-        unit = meaning.unit
-        if (
-            unit is None
-            and stated.axes
-            and stated.axes.degrees is not None
-            and not meaning.sigma
-            and (meaning.quantity in _POLAR[1:])
-        ):
-            unit = _unit("deg" if stated.axes.degrees else "rad")
-        plain = one is not None or is_plain(split_unit(column.name)[0], meaning)
-        rank = meaning.rank + (not plain) + 10 * (unit is None)  # a stated unit is preferred to a plainer name
-        why = f"--map {one.words}" if one else "name"
-        found.append(ColumnMatch(column, replace(meaning, rank=rank), unit, why if unit else "", plain, one))
+        meaning = table_meaning(column.name, column.comment)
+        if meaning is not None:
+            unit = meaning.unit
+            if unit is None and degrees is not None and not meaning.sigma and meaning.quantity in _POLAR[1:]:
+                unit = _unit("deg" if degrees else "rad")
+            plain = is_plain(split_unit(column.name)[0], meaning)
+            meaning = replace(meaning, unit=unit, rank=meaning.rank + (not plain) + 10 * (unit is None))
+        found.append(meaning)
     return found
 
 
@@ -402,25 +428,40 @@ def _span(match: ColumnMatch) -> float:
 class _UnitInference:
     """The units, directions and assumptions of chosen columns."""
 
-    def __init__(self, chosen: ColumnChoice, remarks: str, rules: Rules, stated: StatedReading) -> None:
-        self.matched, self.chosen, self.remarks = chosen.matched, chosen, remarks
+    def __init__(
+        self, chosen: ColumnChoice, remarks: str, rules: Rules, stated: StatedReading, decoder: Decoder | None
+    ) -> None:
+        self.matched, self.chosen, self.remarks, self.decoder = chosen.matched, chosen, remarks, decoder
         self.directed = stated.axes is not None and stated.axes.directed
+        self.rule = f"layout '{decoder.name}'" if decoder else _ROS
         self.rules, self.of_table, self.noun = rules, rules == "table", _NOUNS[rules]
         self.agreed = _agreement(chosen.matched)
+
+    def _is_ruled(self, group: Sequence[ColumnMatch]) -> bool:
+        """Return whether the registry or ROS defines the units and axes of columns."""
+        return (self.decoder is not None or self.rules == "ros") and all(one.named for one in group)
+
+    def _known_by(self, unit: str, direction: str = "") -> str:
+        """Return what states the unit and the direction of a column."""
+        if unit == self.rule and direction.partition(": ")[2] in ("", self.rule):
+            return self.rule
+        return "; ".join(filter(None, (f"unit: {unit}", direction)))
 
     def cartesian(self) -> ColumnPlan:
         """Plan a position from x, y and perhaps z."""
         group = tuple(self.matched[axis] for axis in "xyz" if axis in self.matched)
-        standard = self.rules == "ros" or all(one.column.standard for one in group)
+        standard = self._is_ruled(group) or all(one.column.standard for one in group)
         directions, reasons, about_axes = self._directions(group, standard=standard)
         sides = () if self.of_table else directions
         units, why, about = self._lengths(group, standard=standard, proven=self._by_range(), sides=sides)
         readings = [
-            ColumnReading(one.quantity, one.name, unit.name, direction, f"unit: {why}; direction: {reason}")
+            ColumnReading(
+                one.quantity, one.name, unit.name, direction, self._known_by(one.why or why, f"direction: {reason}")
+            )
             for one, unit, direction, reason in zip(group, units, directions, reasons, strict=False)
         ]
         scales = _three([one.sign * unit.scale for one, unit in zip(group, units, strict=True)], 1.0)
-        claimed = [self.matched.get(name) for name in (_POLAR if self.of_table else _POLAR[:2])]
+        claimed = [one if one and one.meaning.kind != "vague" else None for one in map(self.matched.get, _POLAR)]
         angle = self._claimed_angle(readings)
         usual = (units[0], angle, claimed[1].unit if claimed[1] and claimed[1].unit else angle)
         return ColumnPlan(
@@ -451,7 +492,7 @@ class _UnitInference:
     def polar(self) -> ColumnPlan:
         """Plan a position from range, azimuth and perhaps elevation."""
         distance, azimuth, elevation = self.matched["range"], self.matched["azimuth"], self.matched.get("elevation")
-        (unit,), why, about = self._lengths((distance,), standard=False)
+        (unit,), why, about = self._lengths((distance,), standard=self.decoder is not None and distance.named)
         angles = tuple(_present(azimuth, elevation))
         angle, why_angle, about_angle = self._angle(angles)
         sign, why_sign, about_sign = self._azimuth_sign(azimuth, angle)
@@ -463,14 +504,13 @@ class _UnitInference:
         if down:
             scales[-1] = -scales[-1]
         side = f"to the {'left' if sign > 0 else 'right'}"
-        why_azimuth = f"unit: {why_angle}; sign: {why_sign}"
         readings = [
-            ColumnReading("range", distance.name, unit.name, "", f"unit: {why}"),
-            ColumnReading("azimuth", azimuth.name, units[0].name, side, why_azimuth),
+            ColumnReading("range", distance.name, unit.name, "", self._known_by(why)),
+            ColumnReading("azimuth", azimuth.name, units[0].name, side, self._known_by(why_angle, f"sign: {why_sign}")),
         ]
         if elevation is not None:
-            side, why = ("downwards", _COMMENT) if down else ("upwards", "as usual")
-            why = f"unit: {why_angle}; sign: {why}"
+            side, why = ("downwards", _COMMENT) if down else ("upwards", self.rule if self.decoder else "as usual")
+            why = self._known_by(why_angle, f"sign: {why}")
             readings.append(ColumnReading("elevation", elevation.name, units[-1].name, side, why))
         vague, unused = self._vague_assumption(), self._unused_assumption()
         return ColumnPlan(
@@ -504,7 +544,7 @@ class _UnitInference:
         largest = farthest(*(one.column.values * unit.scale for one, unit in zip(group, units, strict=True)))
         names = ", ".join(one.name for one in group)
         if stated or (standard and largest <= FARTHEST_M):
-            why = stated.why if stated else _ROS
+            why = stated.why if stated else self.rule
             if largest <= FARTHEST_M or self.of_table:
                 return units, why, None
             what = f"{names} would reach {largest:.4g} m in {usual.name} ({why})"
@@ -513,7 +553,7 @@ class _UnitInference:
         largest = farthest(*(one.column.values for one in group))
         finding = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
         units = [finding.unit] * len(group)
-        if finding is proven or (finding.certain and not self.of_table):
+        if finding is proven or (finding.certain and not self.of_table and all(one.named for one in group)):
             return units, finding.why, None
         self._refuse_either(group, finding)
         text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
@@ -556,8 +596,12 @@ class _UnitInference:
         self, group: tuple[ColumnMatch, ...], *, standard: bool
     ) -> tuple[tuple[str, str, str], list[str], ColumnAssumption | None]:
         """Return where x, y and z point, what states each, and what is assumed."""
+        if all(one.mapped for one in group[:2]) and not self.of_table:
+            return ("forward", "left", "up"), ["--map"] * 3, None
         if self.of_table:
             return self._documented_directions(group)
+        if self.decoder:
+            return ("forward", "left", "up"), [self.rule] * 3, None
         said = dict(axes_in(self.remarks)) | {
             one.quantity: side for one in group if (side := axis_side(one.column.comment)) is not None
         }
@@ -569,7 +613,7 @@ class _UnitInference:
                 _up_assumption(group, said, whole),
             )
         if standard:
-            return ("forward", "left", "up"), [_ROS] * 3, None
+            return ("forward", "left", "up"), [self.rule] * 3, None
         forward, why = self._forward(group, said)
         lateral = _AXES[forward]
         side, why_side = self._side(lateral, forward, said)
@@ -639,11 +683,13 @@ class _UnitInference:
             unstated = [angle for angle in angles if angle.unit is None]
             if unstated and unit.name not in ("rad", "deg"):
                 self._refuse_either(unstated, Finding(unit, False, f"values beside {stated.name}", _unit("deg")))
-            if self.of_table or not _implausible(angles[0], unit, finding):
+            if self.of_table or stated.mapped or not _implausible(angles[0], unit, finding):
                 return unit, stated.why, None
             but = f"although the values look like {finding.unit.name}: {finding.why}"
             text = f"{_are(names)} taken as {unit.name} ({stated.why}), {but}"
             return unit, stated.why, self._unit_assumption("angle-unit", text, angles, unit)
+        if self.decoder and all(angle.named for angle in angles):
+            return _unit("deg" if self.decoder.degrees else "rad"), self.rule, None
         if finding.certain and not (self.of_table and finding.unit.name == "rad"):
             return finding.unit, finding.why, None
         self._refuse_either(angles, finding)
@@ -651,6 +697,10 @@ class _UnitInference:
         return finding.unit, "assumed", self._unit_assumption("angle-unit", text, angles, finding.unit)
 
     def _azimuth_sign(self, azimuth: ColumnMatch, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
+        if azimuth.mapped:
+            return 1, f"--map {azimuth.mapped.words}", None
+        if self.decoder:
+            return self.decoder.azimuth_sign, self.rule, None
         side = positive_side(azimuth.column.comment)
         if side not in ("left", "right") and "azimuth" in self.remarks.lower():
             line = next(line for line in self.remarks.splitlines() if "azimuth" in line.lower())
@@ -658,8 +708,8 @@ class _UnitInference:
         if side in ("left", "right"):
             return (1 if side == "left" else -1), _COMMENT, None
         name = azimuth.name
-        if self.of_table and (self.directed or azimuth.mapped):
-            return 1, "--radar-axes" if self.directed else azimuth.why, None
+        if self.of_table and self.directed:
+            return 1, "--radar-axes", None
         if self.of_table and azimuth.unit and name == f"azimuth_{azimuth.unit.flag}":
             return 1, "as documented", None
         text = f"{name} is taken as growing to the left; the {self.noun} does not state it"
@@ -701,7 +751,8 @@ class _UnitInference:
     def noise(self, plan: ColumnPlan) -> ColumnPlan:
         """Add the standard deviations of range and angles."""
         matches = [self.chosen.sigma.get(name) for name in _POLAR]
-        if not any(matches) or not (plan.polar or self.of_table):
+        by_rule = self.rules != "message" or self.decoder is not None
+        if not any(matches) or not (plan.polar or by_rule or any(one and one.mapped for one in matches)):
             return plan
         base = _unit("deg" if plan.degrees else "rad").scale
         usual = (
@@ -713,7 +764,7 @@ class _UnitInference:
             (matched.unit.scale if matched and matched.unit else scale)
             for matched, scale in zip(matches, usual, strict=True)
         ]
-        assumed = []
+        assumed, names = [], ", ".join(one.name for one in _present(*matches))
         for name, one, scale in zip(_POLAR, matches, own, strict=True):
             if one and not one.unit and self.of_table:
                 unit = next((unit for unit in units_for(name) if math.isclose(unit.scale, scale)), units_for(name)[0])
@@ -723,6 +774,10 @@ class _UnitInference:
             plan,
             sigma=_three([matched.name if matched else None for matched in matches], None),
             sigma_scales=(own[0], own[1] / base, own[2] / base),
+            readings=(
+                *plan.readings,
+                *([ColumnReading("noise", names, "", "", self.rule)] if by_rule and not self.of_table else ()),
+            ),
             assumptions=(*plan.assumptions, *assumed),
         )
 
@@ -735,15 +790,15 @@ class _UnitInference:
         if doppler is None and ((plan.polar and not self.of_table) or not {"vx", "vy"} <= self.matched.keys()):
             return plan
         names = tuple(one.name for one in group)
-        in_ros_frame = self.rules == "ros" and plan.scales[0] == 1.0
+        in_ros_frame = self._is_ruled(group) and plan.scales[0] == 1.0
         others = ("vx", "vy", "vz") if self.of_table else ()
         speeds = (*group, *(self.matched[name] for name in others if name in self.matched))
         stated = next((speed for speed in speeds if speed.unit), None)
         assumptions = plan.assumptions
         if stated and stated.unit:
-            unit, why = stated.unit, stated.why
+            unit, why = stated.unit, self.rule if self.decoder and not stated.mapped else stated.why
         elif in_ros_frame or all(one.column.standard for one in group):
-            unit, why = _unit("mps"), _ROS
+            unit, why = _unit("mps"), self.rule
         else:
             finding = _speed_unit(group[0].column.values, integer=group[0].column.integer)
             unit, why = finding.unit, "assumed"
@@ -756,7 +811,7 @@ class _UnitInference:
             doppler=names[0] if doppler else None,
             velocity=() if doppler else names[: len(plan.position)],
             doppler_scale=group[0].sign * unit.scale,
-            readings=(*plan.readings, ColumnReading(quantity, ", ".join(names), unit.name, sign, f"unit: {why}")),
+            readings=(*plan.readings, ColumnReading(quantity, ", ".join(names), unit.name, sign, self._known_by(why))),
             assumptions=assumptions,
         )
 
@@ -765,31 +820,56 @@ class _UnitInference:
         one = self.matched.get("amplitude")
         if one is None:
             return plan
+        if self.decoder and self.decoder.amplitude == NO_QUANTITY and one.meaning.kind == "amplitude":
+            return plan  # another level
         unit = one.unit.name if one.unit else "not stated"
         why = one.why if one.unit else "only differences between returns matter; they are taken as dB"
+        if one.unit is None and self._is_ruled((one,)):
+            unit, why = "dB", self.rule
         return replace(
             plan,
             amplitude=one.name,
-            amplitude_scale=one.sign * (one.unit.scale if one.unit else 1.0),
+            amplitude_scale=one.sign
+            * (self.decoder.amplitude_scale if self.decoder else one.unit.scale if one.unit else 1.0),
             readings=(*plan.readings, ColumnReading("amplitude", one.name, unit, "", why)),
         )
 
     def flags(self, plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
-        """Use the flags of invalid values, and mention several sensors and second hypotheses."""
-        names = {column.name.lower(): column for column in columns}
+        """Use the flags of invalid values, and mention several sensors, second hypotheses and what the layout leaves open."""
+        names = {column.name.lower(): column.name for column in columns}
         flags = [column for column in columns if column.name.lower().rpartition(".")[2] in VALID]
-        needed = [flag for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
-        readings = [ColumnReading("valid", flag.name, "", "", "returns where it is 0 are skipped") for flag in needed]
+        needed = [flag.name for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
+        needed = needed if self.decoder is None else [names[name.lower()] for name in self.decoder.needed]
+        readings = [ColumnReading("valid", flag, "", "", "returns where it is 0 are skipped") for flag in needed]
         readings += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]
+        about = _layout_assumption(self.decoder, polar=plan.polar) if self.decoder else None
+        mapped = {quantity for quantity, one in self.matched.items() if one.mapped}
         return replace(
             plan,
-            needed=tuple(flag.name for flag in needed),
-            spoils_position=tuple(names[name].name for name in _INVALID_POSITION if name in names),
-            spoils_doppler=tuple(names[name].name for name in _INVALID_DOPPLER if name in names),
+            needed=tuple(needed),
+            spoils_position=tuple(names[name] for name in _INVALID_POSITION if name in names),
+            spoils_doppler=tuple(names[name] for name in _INVALID_DOPPLER if name in names),
             readings=(*plan.readings, *readings),
-            assumptions=(*plan.assumptions, *_sensor_assumptions(columns)),
-            described=True,
+            assumptions=(
+                *plan.assumptions,
+                *_sensor_assumptions(columns if self.decoder is None else ()),
+                *(one for one in _present(about) if not mapped.issuperset(one.quantities)),
+            ),
+            decoder=self.decoder.name if self.decoder else "",
+            shared_with_lidars=self.decoder is not None and self.decoder.shared_with_lidars,
         )
+
+
+def _layout_assumption(decoder: Decoder, *, polar: bool) -> ColumnAssumption | None:
+    """Return what the layout's documentation leaves open."""
+    if not decoder.assumed:
+        return None
+    mapped = tuple(re.findall(r"--map (\w+)=", decoder.confirm))
+    key = "field-meaning" if mapped else "azimuth-sign" if polar else "axes"
+    quantities = mapped or (("azimuth",) if polar else ("x", "y"))
+    unit = "degrees" in decoder.confirm or "radians" in decoder.confirm
+    about = Assumption(key, "", f"{decoder.name}: {decoder.assumed}", decoder.confirm)
+    return ColumnAssumption(about, quantities, "--radar-axes" in decoder.confirm, unit)
 
 
 def _sensor_assumptions(columns: Sequence[DescribedColumn]) -> list[ColumnAssumption]:
@@ -1000,7 +1080,11 @@ def _agreement(matched: Mapping[str, ColumnMatch]) -> PolarAgreement | None:
 
 
 def plan_described(
-    kind: MessageKind, columns: Sequence[DescribedColumn], arrays: Iterable[str] = (), remarks: str = ""
+    kind: MessageKind,
+    columns: Sequence[DescribedColumn],
+    arrays: Iterable[str] = (),
+    remarks: str = "",
+    stated: StatedReading = NOTHING_STATED,
 ) -> ColumnPlan | None:
     """Plan the columns of a message by the registry, by the names that ROS defines, or by its own description.
 
@@ -1009,20 +1093,29 @@ def plan_described(
         columns: the numbers of a return, with their values in a sample.
         arrays: names of fixed arrays of numbers, and of strings.
         remarks: comments of the definition that belong to no field.
+        stated: what the user states.
+
+    Raises:
+        OptionError: the user maps half a position, or the time.
     """
-    names, arrays = [column.name for column in columns], tuple(arrays)
-    exact = plan_columns(names)
-    if kind in _CLOUD_KINDS and exact is not None and not exact.polar and _is_too_far(exact, columns):
-        return guess_columns(columns, remarks, rules="ros", known=True)
-    if find_decoder(kind, (*names, *arrays)):
-        return plan_for(kind, names, arrays)
-    if kind in _CLOUD_KINDS and exact is not None and {"x", "y"} <= {name.lower() for name in exact.position}:
-        return fill_in(exact, columns)
-    known = exact is not None and exact.looks_like_radar
+    time = next((one for one in stated.column_map if one.quantity == "time"), None)
+    if time is not None:
+        raise OptionError(
+            f"--map {time.words}: messages carry their time in their headers; choose the clock with --clock"
+        )
+    spelt = {name.lower(): name for name in (*arrays, *(column.name for column in columns))}
+    decoder = find_decoder(kind, spelt.values())
     rules: Rules = "ros" if kind in _CLOUD_KINDS else "message"
-    return guess_columns(columns, remarks, rules=rules, known=known or kind in _CLOUD_KINDS)
+    plan = guess_columns(columns, remarks, rules=rules, stated=stated, decoder=decoder)
+    if plan is None:
+        return None
+    mapped = any(one.quantity in ("x", "y", "z", *_POLAR) for one in stated.column_map)
+    if decoder is not None and decoder.covariance and not mapped:
+        noise = ColumnReading("noise", spelt[decoder.covariance.lower()], "", "", f"layout '{decoder.name}'")
+        plan = replace(plan, covariance=noise.column, readings=(*plan.readings, noise))
+    return plan if stated.axes is None else plan.read_as(stated.axes)
 
 
-def _is_too_far(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> bool:
-    """Return whether positions would be farther away than any radar sees if they were meters."""
-    return farthest(*(column.values for column in columns if column.name in plan.position)) > FARTHEST_M
+def plan_names(kind: MessageKind, names: Iterable[str], stated: StatedReading = NOTHING_STATED) -> ColumnPlan | None:
+    """Plan the columns of a message by their names alone."""
+    return plan_described(kind, [DescribedColumn(name, False, "", np.zeros(0)) for name in names], stated=stated)

@@ -3,7 +3,7 @@
 import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from calib_core.arrays import Matrix33
 from calib_core.errors import MessageError, OptionError
 from calib_core.geometry import RigidTransform
 from calib_core.recordings.containers.sources import Assumption
-from calib_core.recordings.field_words import MAPPED_UNITS, MappedColumn
+from calib_core.recordings.field_words import MappedColumn
 
 _AXIS_AND_SIGN = {
     "forward": (0, 1), "backward": (0, -1),
@@ -185,8 +185,6 @@ class ColumnPlan:
         claimed_scales: likewise for the claimed columns, to m and rad.
         doppler_scale: factor from the speed's columns to m/s.
         directions: where the message's own x, y and z point, if the user does not give axes.
-        described: the columns were recognized by what the message says about itself, not by the registry.
-        mapped: the quantities whose columns the user gave.
         other_azimuths: columns that may hold further azimuths of the same returns.
         azimuth_from: one of these, to read the positions at; None reads them at the first azimuth.
         readings: what was taken for what, and why.
@@ -218,8 +216,6 @@ class ColumnPlan:
     claimed_scales: tuple[float, float, float] = _NO_SCALES
     doppler_scale: float = 1.0
     directions: tuple[str, str, str] = _DIRECTIONS
-    described: bool = False
-    mapped: tuple[str, ...] = ()
     other_azimuths: tuple[str, ...] = ()
     azimuth_from: str | None = None
     readings: tuple[ColumnReading, ...] = ()
@@ -303,44 +299,6 @@ class ColumnPlan:
         )
 
 
-_CARTESIAN, _POLAR = ("x", "y", "z"), ("range", "azimuth", "elevation")
-_SIDES = {
-    "x": "forward",
-    "y": "left",
-    "z": "up",
-    "range": "",
-    "azimuth": "to the left",
-    "elevation": "upwards",
-    "doppler": "either: only its size matters",
-}
-_KEYS = {"x": "length-unit", "y": "length-unit", "z": "length-unit", "range": "length-unit", "azimuth": "angle-unit"}
-_KEYS |= {"elevation": "angle-unit", "doppler": "speed-unit"}
-
-
-def column_readings(plan: ColumnPlan) -> tuple[ColumnReading, ...]:
-    """Return what was taken for what: as the message describes itself, or as the registry or ROS defines its layout."""
-    if plan.described:
-        return plan.readings
-    why = f"layout '{plan.decoder}'" if plan.decoder else "ROS defines it (REP 103)"
-    angle, side = ("deg" if plan.degrees else "rad"), ("to the left" if plan.azimuth_sign > 0 else "to the right")
-    directions = plan.axes.directions if plan.axes else plan.directions
-    place = [("xyz"[axis], "m", directions[axis]) for axis in range(3)]
-    if plan.polar:
-        place = [("range", "m", ""), ("azimuth", angle, side), ("elevation", angle, "upwards")]
-    rows = [
-        ColumnReading(what, name, unit, sign, why)
-        for name, (what, unit, sign) in zip(plan.position, place, strict=False)
-    ]
-    speed = plan.doppler or ", ".join(plan.velocity)
-    rows += [ColumnReading("doppler" if plan.doppler else "velocity", speed, "m/s", "", why)] if speed else []
-    rows += [ColumnReading("amplitude", plan.amplitude, "dB", "", why)] if plan.amplitude else []
-    noise = plan.covariance or ", ".join(name for name in plan.sigma if name)
-    rows += [ColumnReading("noise", noise, "", "", why)] if noise else []
-    rows += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]
-    mapped = {row.quantity for row in plan.readings}
-    return (*(row for row in rows if row.quantity not in mapped), *plan.readings)
-
-
 @dataclass(frozen=True, slots=True)
 class StatedReading:
     """What the user states about the radar's messages.
@@ -368,15 +326,6 @@ class StatedReading:
             found.append(replace(one, column=name))
         return replace(self, column_map=tuple(found))
 
-    def applied(self, plan: ColumnPlan | None) -> ColumnPlan | None:
-        """Return a plan with what the user states in place of what was recognized; None if there is neither."""
-        if plan is not None and self.axes is not None:
-            plan = plan.read_as(self.axes)
-        if not self.column_map:
-            return plan
-        mapped = map_columns(plan, self.column_map)
-        return mapped if plan is not None or self.axes is None else mapped.read_as(replace(self.axes, degrees=None))
-
     def require(self, names: Sequence[str]) -> None:
         """Refuse a --map of columns that a message does not have.
 
@@ -393,162 +342,3 @@ class StatedReading:
 
 NOTHING_STATED = StatedReading()
 """The user states nothing."""
-
-
-def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> ColumnPlan:
-    """Return the plan with the user's columns, units and signs in place of its own.
-
-    Args:
-        plan: what was recognized; None if nothing was.
-        column_map: columns that exist.
-
-    Raises:
-        OptionError: the position is incomplete, or a time is mapped.
-    """
-    given = {column.quantity: column for column in column_map}
-    if "time" in given:
-        raise OptionError(
-            f"--map {given['time'].words}: messages carry their time in their headers; choose the clock with --clock"
-        )
-    start = plan or ColumnPlan(position=(), polar=True, described=True)
-    assumed: list[ColumnAssumption] = []
-    made = _position(start, given, assumed)
-    made = _speed(made, start, given, assumed)
-    if "amplitude" in given:
-        made = replace(made, amplitude=given["amplitude"].column, amplitude_scale=given["amplitude"].scale)
-    made = _sigma(made, given)
-    kept = tuple(assumption for assumption in start.assumptions if not _is_settled(assumption, given, made))
-    readings = tuple(
-        reading for reading in start.readings if reading.quantity not in given and not _is_replaced(reading, made)
-    )
-    return replace(
-        made,
-        mapped=tuple(column.words for column in column_map),
-        assumptions=(*kept, *assumed),
-        readings=(*readings, *(_reading(column) for column in column_map)),
-    )
-
-
-def _is_replaced(reading: ColumnReading, made: ColumnPlan) -> bool:
-    gone = _CARTESIAN if made.polar else _POLAR
-    return reading.quantity in gone or (reading.quantity == "velocity" and not made.velocity)
-
-
-def _is_settled(assumption: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
-    unit = assumption.assumption.key.endswith("-unit")
-    if set(assumption.quantities) & set(_CARTESIAN if made.polar else _POLAR):
-        return True  # about columns that are no longer read
-    return bool(assumption.quantities) and all(
-        q in given and (given[q].unit or not unit) for q in assumption.quantities
-    )
-
-
-def _reading(column: MappedColumn) -> ColumnReading:
-    sign = _SIDES.get(column.quantity, "")
-    return ColumnReading(
-        column.quantity,
-        column.column,
-        column.unit or "as before",
-        f"opposite of {sign}" if sign and column.sign < 0 else sign,
-        f"--map {column.words}",
-    )
-
-
-def _position(start: ColumnPlan, given: Mapping[str, MappedColumn], assumed: list[ColumnAssumption]) -> ColumnPlan:
-    """Return the plan with its position made of the given columns and the remaining ones of the plan."""
-    cartesian, polar = not given.keys().isdisjoint(_CARTESIAN), not given.keys().isdisjoint(_POLAR)
-    if not cartesian and not polar:
-        if not start.position:
-            raise OptionError("--map: say where the position is: x and y, or range and azimuth")
-        return start
-    names = _CARTESIAN if cartesian else _POLAR
-    same = bool(start.position) and start.polar != cartesian
-    old = dict(zip(names, zip(start.position, _scales(start), strict=False), strict=False)) if same else {}
-    columns: list[str] = []
-    scales: list[float] = []
-    for quantity in names:
-        before = old.get(quantity)
-        if quantity in given:
-            one = given[quantity]
-            usual = abs(before[1]) if before and before[0] == one.column else _unit_of_axes(start, quantity)
-            columns.append(one.column)
-            scales.append(one.scale if one.unit else one.sign * (usual or 1.0))
-            if not one.unit and usual is None:
-                assumed.append(_unit_assumption(one))
-        elif before is not None:
-            columns.append(before[0])
-            scales.append(before[1])
-        elif quantity != names[2]:
-            raise OptionError(
-                f"--map: {quantity} is not known; add --map {quantity}=COLUMN:{next(iter(MAPPED_UNITS[quantity]))}"
-            )
-        else:
-            break
-    whole = {"x", "y"} <= given.keys()
-    factor = math.pi / 180.0 if start.degrees else 1.0
-    return replace(
-        start,
-        position=tuple(columns),
-        polar=not cartesian,
-        degrees=False,
-        scales=(scales[0], scales[1], scales[2] if len(scales) > 2 else 1.0),
-        sigma_scales=(start.sigma_scales[0], factor * start.sigma_scales[1], factor * start.sigma_scales[2]),
-        azimuth_sign=1.0 if "azimuth" in given else start.azimuth_sign,
-        directions=("forward", "left", "up") if whole or not same else start.directions,
-        claimed=(None, None, None),
-        covariance=None,
-    )
-
-
-def _unit_of_axes(plan: ColumnPlan, quantity: str) -> float | None:
-    """Return the angle unit that --radar-axes gives, as a factor to rad; None if it gives none."""
-    if quantity not in ("azimuth", "elevation") or plan.axes is None or plan.axes.degrees is None:
-        return None
-    return math.pi / 180.0 if plan.axes.degrees else 1.0
-
-
-def _scales(plan: ColumnPlan) -> tuple[float, float, float]:
-    """Return the factors of the position's columns to m and rad."""
-    factor = math.pi / 180.0 if plan.polar and plan.degrees else 1.0
-    return plan.scales[0], factor * plan.scales[1], factor * plan.scales[2]
-
-
-def _unit_assumption(column: MappedColumn) -> ColumnAssumption:
-    unit = next(iter(MAPPED_UNITS[column.quantity]))
-    return ColumnAssumption(
-        Assumption(
-            _KEYS[column.quantity],
-            "",
-            f"{column.column} is taken as {unit}; --map {column.words} does not state the unit",
-            f"--map {column.words}:{unit}",
-        ),
-        (column.quantity,),
-    )
-
-
-def _speed(
-    made: ColumnPlan, start: ColumnPlan, given: Mapping[str, MappedColumn], assumed: list[ColumnAssumption]
-) -> ColumnPlan:
-    """Return the plan with the given speed; without one, velocities follow their axes."""
-    one = given.get("doppler")
-    if one is not None:
-        same = start.doppler == one.column
-        if not one.unit and not same:
-            assumed.append(_unit_assumption(one))
-        scale = one.scale if one.unit or not same else one.sign * abs(start.doppler_scale)
-        return replace(made, doppler=one.column, doppler_scale=scale, velocity=())
-    if made.velocity and made.position != start.position:
-        places = [start.position.index(name) if name in start.position else -1 for name in made.position]
-        fits = not start.polar and not made.polar and all(0 <= place < len(made.velocity) for place in places)
-        return replace(made, velocity=tuple(made.velocity[place] for place in places) if fits else ())
-    return made
-
-
-def _sigma(made: ColumnPlan, given: Mapping[str, MappedColumn]) -> ColumnPlan:
-    sigma, scales = list(made.sigma), list(made.sigma_scales)
-    for index, quantity in enumerate(_POLAR):
-        one = given.get(f"sigma_{quantity}")
-        if one is not None:
-            sigma[index] = one.column
-            scales[index] = abs(one.scale) / (math.pi / 180.0 if index and made.degrees else 1.0)
-    return replace(made, sigma=(sigma[0], sigma[1], sigma[2]), sigma_scales=(scales[0], scales[1], scales[2]))

@@ -1,6 +1,5 @@
-"""Recognize position, speed, amplitude and noise among the columns of a radar message, whatever their names."""
+"""Make returns of the columns of a radar message as they are planned."""
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -11,36 +10,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar.column_plan import ColumnPlan, plain_name
 
-_POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
-_RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
-_AZIMUTHS = ("azimuth", "azimuthangle", "azimuthrad", "azimuthdeg", "az")
-_ELEVATIONS = ("elevation", "elevationangle", "elevationrad", "elevationdeg", "el")
-_CLAIMED_AZIMUTHS = (*_AZIMUTHS, "bearing")
-_FIRST_AZIMUTHS = (*_AZIMUTHS, "azimuth0", "azimuth1")
-_OTHER_AZIMUTHS = (
-    "azimuth1", "azimuth2", "azimuth3", "secondazimuth", "azimuthsecond", "azimuthambiguity", "azimuthambiguous",
-    "azimuthalternative", "alternativeazimuth", "azimuthhypothesis", "azimuthhypothesis1", "azimuthhypothesis2",
-)  # fmt: skip
-_SPEEDLIKE = re.compile(
-    r"doppler|radial_?(vel|speed)|(vel|speed)_?radial|range_?rate|v_?rad(ial)?\b|^v_?r\b", re.IGNORECASE
-)
-_DOPPLERS = (
-    "dopplervelocity", "vdopplermps", "radialvelocity", "radialspeed", "rangerate", "dopplermps", "doppler", "vradial",
-    "velocity", "vr", "v", "speed", "speedradial", "rrate",
-)  # fmt: skip
-_AMPLITUDES = ("snrdb", "snr", "intensity", "rcs", "power", "amplitude", "magnitude")
-_VELOCITIES = (
-    ("vx", "vy", "vz"), ("velocityx", "velocityy", "velocityz"), ("relativevelocityx", "relativevelocityy", "relativevelocityz"),
-    ("twistlinearx", "twistlineary", "twistlinearz"),
-    ("twisttwistlinearx", "twisttwistlineary", "twisttwistlinearz"), ("vrelx", "vrely", "vrelz"), ("vabsx", "vaby", "vabz"),
-)  # fmt: skip
-_SIGMAS = (
-    ("rangestd", "sigmarange", "rangesigma", "distancestd"),
-    ("azimuthstd", "azimuthanglestd", "sigmaazimuth", "azimuthsigma"),
-    ("elevationstd", "elevationanglestd", "sigmaelevation", "elevationsigma"),
-)
-_INVALID_POSITION = ("invaliddistance", "invalidrange", "invalidazimuth", "invalidelevation")
-_INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 _UNKNOWN = np.full(3 << 16, np.nan)
 _FARTHEST_M = 1e9
 """What is farther is no number that can be computed with."""
@@ -83,61 +52,6 @@ def unknown(n: int, columns: int = 0) -> np.ndarray:
         values = np.full(size, np.nan)
         values.setflags(write=False)
     return values.reshape(n, columns) if columns else values
-
-
-def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
-    """Recognize the columns of a radar by their names; None if there is no position.
-
-    Args:
-        names: as the message spells them; nested ones dotted.
-    """
-    by_plain = {plain_name(name): name for name in reversed(list(names))}
-
-    def first(candidates: Iterable[str]) -> str | None:
-        return next((by_plain[name] for name in candidates if name in by_plain), None)
-
-    position = _cartesian(by_plain)
-    polar = not position
-    degrees = False
-    if polar:
-        polar_names = (first(_RANGES), first(_FIRST_AZIMUTHS), first(_ELEVATIONS))
-        if polar_names[0] is None or polar_names[1] is None:
-            return None
-        position = tuple(name for name in polar_names if name is not None)
-        degrees = plain_name(position[1]).endswith("deg")
-    sets = (tuple(by_plain[name] for name in names if name in by_plain) for names in _VELOCITIES)
-    velocity = next((found for found in sets if len(found) >= 2), ())
-    doppler = first(_DOPPLERS)
-    sigma = tuple(first(candidates) for candidates in _SIGMAS)
-    return ColumnPlan(
-        position=position,
-        polar=polar,
-        degrees=degrees,
-        doppler=doppler,
-        velocity=() if doppler else velocity,
-        amplitude=first(_AMPLITUDES),
-        sigma=(sigma[0], sigma[1], sigma[2]),
-        spoils_position=tuple(by_plain[name] for name in _INVALID_POSITION if name in by_plain),
-        spoils_doppler=tuple(by_plain[name] for name in _INVALID_DOPPLER if name in by_plain),
-        claimed=(first(_RANGES), first(_CLAIMED_AZIMUTHS), first(_ELEVATIONS)),
-        other_azimuths=tuple(
-            by_plain[name] for name in _OTHER_AZIMUTHS if name in by_plain and by_plain[name] not in position
-        ),
-    )
-
-
-def names_a_speed(names: Iterable[str]) -> bool:
-    """Return whether a column's name says that it is a radial speed, which only a radar or a rare lidar measures."""
-    return any(_SPEEDLIKE.search(name) for name in names)
-
-
-def _cartesian(by_plain: dict[str, str]) -> tuple[str, ...]:
-    for prefix in _POSITION_PREFIXES:
-        if f"{prefix}x" in by_plain and f"{prefix}y" in by_plain:
-            return tuple(by_plain[f"{prefix}{axis}"] for axis in "xyz" if f"{prefix}{axis}" in by_plain)
-    if "distx" in by_plain and "disty" in by_plain:
-        return by_plain["distx"], by_plain["disty"]
-    return ()
 
 
 def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:

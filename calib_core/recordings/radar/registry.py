@@ -2,26 +2,23 @@
 
 A layout is recognized by the names of its fields, as the recording itself declares them, never by the name of a
 package: three packages are called radar_msgs. If several match, the one with the most fields is used; a message
-that matches none is read by its column names alone (columns.py).
+that matches none is read by its columns alone (column_guess.py).
 """
 
-import re
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Literal, get_args
 
 from calib_core.plugins import load_plugins, warn_skipped
-from calib_core.recordings.containers.sources import Assumption
-from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan
-from calib_core.recordings.radar.columns import plan_columns
+from calib_core.recordings.field_words import meaning_of
 
 MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
 """sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
 
 _RADIANS = "rad, azimuth positive to the left, elevation upwards"
 _UNUSED = "not used, since the message has positions"
-_NONE = "none"
+NO_QUANTITY = "none"
 _AWAY = "positive moving away"
 
 
@@ -58,10 +55,10 @@ class Decoder:
     source: str
     kind: MessageKind
     fields: tuple[str, ...]
-    angles: str = _NONE
+    angles: str = NO_QUANTITY
     speed: str = _AWAY
     amplitude: str = "dB"
-    noise: str = _NONE
+    noise: str = NO_QUANTITY
     note: str = ""
     assumed: str = ""
     confirm: str = "--radar-axes forward,left,up"
@@ -88,6 +85,13 @@ class Decoder:
                 f"{self.name}: {', '.join(missing)} must be among its fields, or messages without fit it too"
             )
 
+    @property
+    def columns(self) -> Mapping[str, str]:
+        """The columns whose names do not say what they are, by quantity."""
+        others = {"doppler": self.doppler, "amplitude": self.amplitude_field}
+        polar = dict(zip(("range", "azimuth", "elevation"), self.polar, strict=False))
+        return polar | {quantity: name for quantity, name in others.items() if name}
+
 
 def _f(words: str) -> tuple[str, ...]:
     return tuple(words.split())
@@ -96,7 +100,7 @@ def _f(words: str) -> tuple[str, ...]:
 _CLOUDS = (
     Decoder(
         "positions and intensity", "ti_mmwave_rospkg of radar-lab, radar_scan_pcl; any XYZI cloud", "cloud",
-        _f("x y z intensity"), speed=_NONE, amplitude="of the driver's choice", shared_with_lidars=True,
+        _f("x y z intensity"), speed=NO_QUANTITY, amplitude="of the driver's choice", shared_with_lidars=True,
         note="a lidar's cloud looks the same: choose it with --radar-topic",
     ),
     Decoder(
@@ -124,7 +128,7 @@ _CLOUDS = (
     ),
     Decoder(
         "positions and velocities", "ars548_driver of robotics-upo, ObjectList; other trackers", "cloud", _f("x y z vx vy"),
-        speed="from vx, vy along the line of sight", amplitude=_NONE, note="tracked extents, not reflections",
+        speed="from vx, vy along the line of sight", amplitude=NO_QUANTITY, note="tracked extents, not reflections",
     ),
     Decoder(
         "smartmicro targets", "smartmicro_ros2_radars (UMRR), targets", "cloud",
@@ -134,12 +138,12 @@ _CLOUDS = (
     Decoder(
         "smartmicro objects", "smartmicro_ros2_radars (UMRR), objects", "cloud",
         _f("x y z speed_absolute heading length quality acceleration object_id"),
-        speed="none: speed_absolute is along the heading", amplitude=_NONE, note="tracked extents, not reflections",
+        speed="none: speed_absolute is along the heading", amplitude=NO_QUANTITY, note="tracked extents, not reflections",
     ),
     Decoder(
         "CARLA radar", "carla_ros_bridge, radar", "cloud",
         _f("x y z Range Velocity AzimuthAngle ElevationAngle"),
-        angles=f"rad, azimuth positive to the right, against y; {_UNUSED}", amplitude=_NONE,
+        angles=f"rad, azimuth positive to the right, against y; {_UNUSED}", amplitude=NO_QUANTITY,
         note="ElevationAngle is at byte 28, not 24: offsets are read as declared",
     ),
     Decoder(
@@ -178,7 +182,7 @@ _LISTS = (
     Decoder(
         "radar_msgs tracks", "ros-perception radar_msgs/RadarTracks", "list",
         _f("position.x position.y position.z velocity.x velocity.y velocity.z position_covariance"),
-        speed="from velocity along the line of sight", amplitude=_NONE, covariance="position_covariance",
+        speed="from velocity along the line of sight", amplitude=NO_QUANTITY, covariance="position_covariance",
         noise="covariance of the position, six figures; 0 means unknown", note="tracked objects, not reflections",
     ),
     Decoder(
@@ -188,7 +192,7 @@ _LISTS = (
     ),
     Decoder(
         "UniBw detections", "UniBw radar_msgs/DetectionRecord", "list",
-        _f("range.value azimuth.value elevation.value radial_speed.value"), angles=_RADIANS, amplitude=_NONE,
+        _f("range.value azimuth.value elevation.value radial_speed.value"), angles=_RADIANS, amplitude=NO_QUANTITY,
         polar=_f("range.value azimuth.value elevation.value"), doppler="radial_speed.value",
         assumed="the definition states neither the unit nor the sign of the angles; "
         "assumed radians, azimuth positive to the left and elevation upwards",
@@ -207,12 +211,12 @@ _LISTS = (
     Decoder(
         "derived objects", "AutonomouStuff derived_object_msgs/ObjectArray", "list",
         _f("detection_level pose.position.x pose.position.y pose.position.z twist.linear.x twist.linear.y"),
-        speed="from twist along the line of sight", amplitude=_NONE, note="tracked objects, not reflections",
+        speed="from twist along the line of sight", amplitude=NO_QUANTITY, note="tracked objects, not reflections",
     ),
     Decoder(
         "derived objects with covariance", "AutonomouStuff derived_object_msgs/ObjectWithCovarianceArray", "list",
         _f("detection_level pose.pose.position.x pose.pose.position.y pose.pose.position.z pose.covariance"),
-        speed="from twist along the line of sight", amplitude=_NONE, covariance="pose.covariance",
+        speed="from twist along the line of sight", amplitude=NO_QUANTITY, covariance="pose.covariance",
         noise="covariance of the position; 0 means unknown", note="tracked objects, not reflections",
     ),
 )  # fmt: skip
@@ -235,7 +239,7 @@ _POINTS = (
         "Delphi ESR tracks", "AutonomouStuff delphi_esr_msgs/EsrTrack", "point",
         _f("canmsg id lat_rate status angle range range_accel range_rate"), polar=_f("range angle"), doppler="range_rate",
         degrees=True,
-        azimuth_sign=-1, angles="deg, azimuth positive to the right (assumed); no elevation", amplitude=_NONE,
+        azimuth_sign=-1, angles="deg, azimuth positive to the right (assumed); no elevation", amplitude=NO_QUANTITY,
         needed=("status",), point_number="id", note="tracks of status 0 are skipped",
         assumed=f"the definition states neither the unit nor the sign of angle; assumed degrees, {_CLOCKWISE}",
         confirm="--radar-axes forward,left,up,degrees",
@@ -285,67 +289,6 @@ def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
     return max(fitting, key=lambda decoder: len(decoder.fields), default=None)
 
 
-def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()) -> ColumnPlan | None:
-    """Plan the columns of a message by the registry or by their names alone; None if there is no position.
-
-    Args:
-        kind: what the fields are fields of.
-        names: of single numbers, as the message spells them; nested ones dotted.
-        arrays: names of fixed arrays of numbers, and of strings.
-    """
-    names, arrays = tuple(names), tuple(arrays)
-    decoder = find_decoder(kind, (*names, *arrays))
-    plan = plan_columns(names)
-    if decoder is None:
-        return plan
-    spelt = {name.lower(): name for name in (*arrays, *names)}
-    if plan is None:
-        plan = ColumnPlan(position=(), polar=True)
-    if decoder.polar:
-        polar = tuple(spelt[name.lower()] for name in decoder.polar)
-        claimed = (polar[0], polar[1], polar[2] if len(polar) == 3 else None)
-        plan = replace(plan, position=polar, polar=True, claimed=claimed)
-    return replace(
-        plan,
-        degrees=decoder.degrees or plan.degrees,
-        azimuth_sign=float(decoder.azimuth_sign),
-        doppler=spelt[decoder.doppler.lower()] if decoder.doppler else plan.doppler,
-        velocity=() if decoder.doppler else plan.velocity,
-        amplitude=spelt[decoder.amplitude_field.lower()] if decoder.amplitude_field else plan.amplitude,
-        amplitude_scale=decoder.amplitude_scale,
-        covariance=spelt[decoder.covariance.lower()] if decoder.covariance else None,
-        needed=tuple(spelt[name.lower()] for name in decoder.needed),
-        decoder=decoder.name,
-        assumptions=_assumptions(decoder, polar=bool(plan.polar)),
-        shared_with_lidars=decoder.shared_with_lidars,
-    )
-
-
-def _assumptions(decoder: Decoder, *, polar: bool) -> tuple[ColumnAssumption, ...]:
-    """Return what the layout's documentation leaves open."""
-    if not decoder.assumed:
-        return ()
-    mapped = tuple(re.findall(r"--map (\w+)=", decoder.confirm))
-    key = "field-meaning" if mapped else "azimuth-sign" if polar else "axes"
-    quantities = mapped or (("azimuth",) if polar else ("x", "y"))
-    axes = "--radar-axes" in decoder.confirm
-    unit = "degrees" in decoder.confirm or "radians" in decoder.confirm
-    about = Assumption(key, "", f"{decoder.name}: {decoder.assumed}", decoder.confirm)
-    return (ColumnAssumption(about, quantities, axes, unit),)
-
-
-def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:
-    """Plan a later message of a topic: its own columns, with the user's axes of the first plan."""
-    names = tuple(names)
-    if first.described or first.mapped:
-        return first if set(first.columns) <= set(names) else None
-    plan = plan_for(kind, names)
-    if plan is None:
-        return None
-    plan = replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from, mount=first.mount)
-    return plan.read_as(first.axes) if first.axes else plan
-
-
 @cache
 def all_decoders() -> tuple[Decoder, ...]:
     """Return every layout: ours, then those of installed packages, which are loaded once, on first use."""
@@ -359,13 +302,14 @@ def all_decoders() -> tuple[Decoder, ...]:
     return tuple(known)
 
 
-def _fault(added: Decoder, known: Iterable[Decoder]) -> str:
+def _fault(added: Decoder, others: Iterable[Decoder]) -> str:
     """Return why a layout cannot be used, "" if it can."""
     if added.kind not in get_args(MessageKind):
         return f"has the unknown kind {added.kind!r}; known: {', '.join(get_args(MessageKind))}"
-    if not added.polar and plan_columns(added.fields) is None:
+    known = {meaning.quantity for name in added.fields if (meaning := meaning_of(name))} | added.columns.keys()
+    if not {"x", "y"} <= known and not {"range", "azimuth"} <= known:
         return "has no position: its fields have neither x, y, z nor a range and an azimuth, and it has no polar"
-    for decoder in known:
+    for decoder in others:
         if decoder.name == added.name:
             return "has the same name as another layout"
         if decoder.kind == added.kind and _folded(decoder.fields) == _folded(added.fields):

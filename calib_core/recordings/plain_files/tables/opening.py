@@ -295,7 +295,7 @@ def _plan(
     ]
     try:
         with np.errstate(all="ignore"):
-            plan = guess_columns(columns, rules="table", known=True, stated=stated)
+            plan = guess_columns(columns, rules="table", stated=stated)
         if plan is None:
             foreign = {
                 name: found for name, below in zip(names, units, strict=True) if (found := unknown_unit(name, below))

@@ -10,11 +10,11 @@ from calib_core.recordings.containers.sources import CONFIRM_ALL, Assumption
 from calib_core.recordings.field_words import has_word, words_of
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described
+from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described, plan_names
 from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnAssumption, ColumnPlan, StatedReading
 from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples, described, leaf_names
-from calib_core.recordings.radar.registry import find_decoder, plan_for
+from calib_core.recordings.radar.registry import find_decoder
 
 _DEEPEST = 5
 _COUNTS = ("count", "cnt", "num", "number", "n", "nr", "nof", "size", "len", "length", "total", "valid")
@@ -45,11 +45,11 @@ class ArrayLayout:
     ) -> "ArrayLayout | None":
         """Recognize a message by its arrays: by the registry, or by what they say about themselves."""
         names = [field.name for field in definition.fields if field.count and field.type in PRIMITIVES]
-        decoder, plan = find_decoder("arrays", names), plan_for("arrays", names)
-        if decoder is not None and plan is not None:
+        decoder, within = find_decoder("arrays", names), stated.within("", names)
+        if decoder is not None:
             count = decoder.count_field if decoder.count_field in definition.names else None
-            within = stated.within("", names)
-            return cls(definition, within.applied(plan) or plan, count) if within else None
+            plan = plan_names("arrays", names, within) if within else None
+            return cls(definition, plan, count) if plan else None
         if samples is None:
             return None
         scopes = _scopes(definition, definition.type, ())
@@ -104,8 +104,7 @@ def _arrays_in(samples: Samples, path: tuple[str, ...], kind: str, stated: State
     """Return the reader of the arrays of one message if they hold a radar's returns or the columns that the user maps."""
     definition = samples.definition
     fields = [field for field in definition.types[kind] if field.count is not None and field.type in PRIMITIVES]
-    named = [DescribedColumn(field.name, False, "", np.zeros(0)) for field in fields]
-    if not stated.column_map and plan_described("arrays", named) is None:
+    if not stated.column_map and plan_names("arrays", [field.name for field in fields]) is None:
         return None
     messages = [_message_within(message, path) for message in samples.messages]
     for names in _equal_length_groups([(field.name, field.count or 0) for field in fields], messages):
@@ -124,10 +123,8 @@ def _arrays_in(samples: Samples, path: tuple[str, ...], kind: str, stated: State
             for field in fields
             if field.name in names
         ]
-        plan = plan_described("arrays", columns, (), definition.remarks.get(kind, ""))
-        known = plan is not None and plan.looks_like_radar
-        plan = within.applied(plan)
-        if plan is not None and (within.column_map or known):
+        plan = plan_described("arrays", columns, (), definition.remarks.get(kind, ""), within)
+        if plan is not None and (within.column_map or plan.looks_like_radar):
             return ArrayLayout(definition, plan, counter, path)
     return None
 
@@ -283,11 +280,10 @@ class ListLayout:
         return best.with_plan(replace(best.plan, notes=(*best.plan.notes, note)))
 
     @property
-    def rank(self) -> tuple[bool, bool, bool, bool, bool]:
+    def rank(self) -> tuple[bool, bool, bool, bool]:
         """The order of preference among several lists: detections with speed and amplitude first."""
         plan = self.plan
         return (
-            bool(plan.mapped),
             bool(plan.decoder),
             not self.objects,
             plan.doppler is not None or bool(plan.velocity),
@@ -358,9 +354,10 @@ def _list_at(
     if within is None:
         return None
     known = find_decoder("list", (*numbers, *others)) is not None
-    first = plan_described("list", described(definition, place.element, numbers, _no_values), others)
-    if not within.column_map and (first is None or not first.looks_like_radar):
-        return None
+    if not within.column_map:
+        first = plan_described("list", described(definition, place.element, numbers, _no_values), others)
+        if first is None or not first.looks_like_radar:
+            return None
     parents = (
         [parent for message in samples.messages for parent in place.parents(message)] if samples and not known else []
     )
@@ -369,20 +366,11 @@ def _list_at(
         definition, place.element, numbers, lambda name: _sampled(parents, place.path[-1], name, counter)
     )
     remarks = "\n".join(definition.remarks.get(kind, "") for kind in (place.element, place.scope))
-    plan = plan_described("list", columns, others, remarks)
-    if plan is not None and not plan.looks_like_radar and not within.column_map:
+    plan = plan_described("list", columns, others, remarks, within)
+    if plan is None or not (plan.looks_like_radar or within.column_map):
         return None
-    plan = within.applied(plan)
-    return (
-        None
-        if plan is None
-        else ListLayout(
-            definition,
-            place,
-            _with_place_assumption(plan, place, parents, counter, len(samples.messages) if parents and samples else 0),
-            counter,
-        )
-    )
+    messages = len(samples.messages) if parents and samples else 0
+    return ListLayout(definition, place, _with_place_assumption(plan, place, parents, counter, messages), counter)
 
 
 def _no_values(name: str) -> np.ndarray:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from calib_core.errors import MessageError
+from calib_core.recordings.field_words import names_a_speed
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described
+from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described, plan_names
 from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnPlan, StatedReading
-from calib_core.recordings.radar.columns import Returns, names_a_speed, no_returns, returns_from
+from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples
-from calib_core.recordings.radar.registry import plan_for, plan_like
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
 
@@ -67,11 +67,10 @@ class CloudLayout:
         within = stated.within("", dtype.names or ())
         if within is None:
             return None
-        plan = plan_for("cloud", dtype.names or ())
+        plan = plan_names("cloud", dtype.names or (), within)
         whole = plan is not None and any(dtype[name].kind != "f" for name in plan.position)
         if plan is None or not plan.decoder or whole:  # integers are hardly meters
-            plan = plan_described("cloud", _cloud_columns(samples, dtype))
-        plan = within.applied(plan)
+            plan = plan_described("cloud", _cloud_columns(samples, dtype), stated=within)
         if plan is None:
             return None
         points = message.whole("height") * message.whole("width")
@@ -96,7 +95,7 @@ class CloudLayout:
         data = message.octets("data")
         height, width, step = message.whole("height"), message.whole("width"), message.whole("row_step")
         dtype = _point_dtype(message, order)
-        plan = plan_like(self.plan, "cloud", dtype.names or ())
+        plan = _plan_like(self.plan, dtype.names or ())
         if plan is None:
             raise MessageError(f"a cloud has no position, only the fields {', '.join(dtype.names or ('(none)',))}")
         points = _points(data, dtype, height, width, step)
@@ -173,6 +172,17 @@ def lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
     if plan.doppler is not None or plan.velocity or names_a_speed(names):
         return False
     return points > _LIDAR_POINTS or not plan.looks_like_radar
+
+
+def _plan_like(first: ColumnPlan, names: Iterable[str]) -> ColumnPlan | None:
+    """Plan a later message of a topic, which may have other columns of the same layout."""
+    names = set(names)
+    if names.issuperset((*first.columns, *(name for name in first.claimed if name))):
+        return first
+    plan = plan_names("cloud", names, StatedReading(axes=first.axes))
+    if plan is None or first.polar or first.scales != plan.scales:
+        return None
+    return replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from, mount=first.mount)
 
 
 def _after_header(payload: bytes, definition: Definition) -> int:
@@ -334,8 +344,8 @@ class ChannelCloudLayout:
         within = stated.within("", list(columns))
         if within is None:
             return None
-        plan = plan_described("channels", [DescribedColumn(name, False, "", v) for name, v in columns.items()])
-        plan = within.applied(plan)
+        described = [DescribedColumn(name, False, "", values) for name, values in columns.items()]
+        plan = plan_described("channels", described, stated=within)
         if plan is None:
             return None
         return cls(definition, plan, lidar_like(plan, columns, len(columns["x"])))

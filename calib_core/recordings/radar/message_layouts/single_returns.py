@@ -13,7 +13,7 @@ from calib_core.recordings.radar.column_guess import plan_described
 from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnPlan, StatedReading
 from calib_core.recordings.radar.columns import Returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples, described
-from calib_core.recordings.radar.registry import find_decoder, plan_for
+from calib_core.recordings.radar.registry import find_decoder
 
 _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
 POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
@@ -54,10 +54,10 @@ class PointLayout:
         within = stated.within("", names)
         if within is None:
             return None
-        plan = within.applied(_point_plan(definition, samples, names, strings))
+        decoder = find_decoder("point", (*names, *strings))
+        plan = _point_plan(definition, samples, names, strings, within)
         if plan is None:
             return None
-        decoder = find_decoder("point", (*names, *strings))
         numbers = (decoder.point_number,) if decoder and decoder.point_number else POINT_NUMBERS
         return cls(
             definition,
@@ -133,22 +133,21 @@ class PointLayout:
 
 
 def _point_plan(
-    definition: Definition, samples: Samples, names: Sequence[str], strings: Sequence[str]
+    definition: Definition, samples: Samples, names: Sequence[str], strings: Sequence[str], stated: StatedReading
 ) -> ColumnPlan | None:
     """Plan the columns of single returns; those of other sensors' messages, such as a vehicle's pose, are not planned."""
-    if find_decoder("point", (*names, *strings)):
-        return plan_for("point", names, strings)
-    first = plan_described("point", described(definition, definition.type, names, _no_values), strings)
-    if first is None or first.doppler is None:
-        return None
-    nested = any("." in name for name in first.position)
-    if nested and not first.polar:
+    columns = described(definition, definition.type, names, _no_values)
+    first = None if stated.column_map else plan_described("point", columns, strings, stated=stated)
+    if first is not None and first.decoder:
+        return first
+    nested = first is not None and not first.polar and any("." in name for name in first.position)
+    if not stated.column_map and (first is None or first.doppler is None or nested):
         return None
     messages = samples.decoded(_SAMPLED_RETURNS)
     columns = described(
         definition, definition.type, names, lambda name: np.array([message.number(name) for message in messages])
     )
-    return plan_described("point", columns, strings, definition.remarks.get(definition.type, ""))
+    return plan_described("point", columns, strings, definition.remarks.get(definition.type, ""), stated)
 
 
 def _no_values(name: str) -> np.ndarray:

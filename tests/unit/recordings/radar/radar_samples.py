@@ -429,6 +429,7 @@ def esr_ethernet(ros: Any) -> Sample:
     text = "".join(f"{kind} {name}\n" for name, kind in scalars.items())
     text += "".join(f"float32[64] {name}\n" for name in columns)
     values = {name: np.random.default_rng(len(name)).uniform(1, 9, 64).astype(np.float32) for name in columns}
+    values["target_report_range"] = np.hypot(values["pos_x"], values["pos_y"])
     row = {name: 0.0 if kind == "float32" else 1 for name, kind in scalars.items()} | values
     row["target_report_count"] = 5
     messages = singles(ros, "delphi_esr_msgs/msg/EsrEthTx", text, [row])

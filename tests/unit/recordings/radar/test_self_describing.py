@@ -177,9 +177,9 @@ def test_a_map_combines_with_the_axes(ros, write, rows):
 
 
 def test_a_map_without_a_unit_leaves_the_unit_assumed(ros, write, rows):
-    with opened(write_list(ros, write, rows), "x=alpha1", "y=alpha2:m", "doppler=vel:mps") as recording:
+    with opened(write_list(ros, write, rows), "x=alpha1", "y=alpha2", "doppler=vel:mps") as recording:
         (one,) = recording.assumptions
-    assert (one.key, one.confirm) == ("length-unit", "--map x=alpha1:m")
+    assert (one.key, one.confirm) == ("length-unit", "--map x=alpha1:m --map y=alpha2:m")
 
 
 def test_a_column_that_does_not_exist_is_refused_with_the_nearest_names(ros1, write, rows):
