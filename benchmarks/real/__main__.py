@@ -6,10 +6,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.real.contents import RealSet
 from benchmarks.real.judging import Judged, judged
 from benchmarks.real.page import page, set_table, table_csv
-from benchmarks.real.sets import SETS
+from benchmarks.real.sets import SETS, RealSet
 from calib_core.errors import CalibrationError
 
 __all__ = ["main", "outcome_of"]
@@ -25,9 +24,8 @@ def outcome_of(row: RealSet, data: Path) -> Judged | str:
         data: the folder with the checkouts.
     """
     try:
-        checkout = row.checkout(data)
         with tempfile.TemporaryDirectory(prefix="cocalib-real-") as scratch:
-            return judged(row.read(checkout, Path(scratch)), row.noise)
+            return judged(row.contents(data, Path(scratch)), row.noise)
     except CalibrationError as error:
         return str(error)
 

@@ -2,7 +2,9 @@
 
 import ast
 import csv
+import json
 import re
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -19,75 +21,64 @@ from calib_core.measurements import ReflectorClick, TimeNs
 __all__ = ["camera_points", "chessboards", "fisheye_pairs", "npy_clicks", "road", "two_reflectors", "view_of_delft"]
 
 
-def camera_points(points: str, extrinsics: str, lens: str, root: Path, _: Path) -> Contents:
+def camera_points(root: Path, _: Path, points: str, extrinsics: str, lens: str) -> Contents:
     """Read radar or lidar positions beside the target's position in the camera's frame, which its lens projects."""
-    file = root / "config" / lens
-    width, height = re.findall(r"image(?:Width|Height): (\d+)", file.read_text(encoding="utf-8"))
-    camera = read_camera(file, image_size_px=(int(width), int(height)))
-    rows = np.loadtxt(root / "data" / points, delimiter=",", skiprows=1)
-    numbers = re.findall(r"-?\d[\d.]*(?:e-?\d+)?", (root / "result" / extrinsics).read_text(encoding="utf-8"))
+    size = re.findall(r"image(?:Width|Height): (\d+)", (root / lens).read_text(encoding="utf-8"))
+    camera = read_camera(root / lens, image_size_px=(int(size[0]), int(size[1])))
+    rows = np.loadtxt(root / points, delimiter=",", skiprows=1)
+    numbers = re.findall(r"-?\d[\d.]*(?:e-?\d+)?", (root / extrinsics).read_text(encoding="utf-8"))
     pose = np.array(numbers, dtype=np.float64)
     return Contents(camera, _rigid(pose[:9].reshape(3, 3), pose[9:]), rows[:, :3], camera.project(rows[:, 3:]))
 
 
-def fisheye_pairs(root: Path, _: Path) -> Contents:
+def fisheye_pairs(root: Path, _: Path, lens: str, pixels: str, points_cm: str) -> Contents:
     """Read pixels, and radar positions in centimetres; the image's size is that of the authors' program."""
-    folder = root / "data" / "Radar_FE_point_pairs"
-    lens = np.loadtxt(folder / "calib_cam1.txt")
-    pixels, points_cm = np.loadtxt(folder / "cam_pts.txt"), np.loadtxt(folder / "radar_pts.txt")
-    camera = Camera("equidistant", 1936, 1552, lens[:9].reshape(3, 3), lens[9:])
-    return Contents(camera, None, points_cm / 100.0, pixels)
+    numbers = np.loadtxt(root / lens)
+    camera = Camera("equidistant", 1936, 1552, numbers[:9].reshape(3, 3), numbers[9:])
+    return Contents(camera, None, np.loadtxt(root / points_cm) / 100.0, np.loadtxt(root / pixels))
 
 
-def npy_clicks(root: Path, _: Path) -> Contents:
+def npy_clicks(root: Path, _: Path, extrinsics: str, pixels: str, points: str, lens: str) -> Contents:
     """Read clicks in image and cloud, one array each."""
-    data = root / "calibration_data"
-    folder = data / "lidar_camera_calibration"
-    pose = np.load(folder / "extrinsics.npz")
-    points, pixels = np.load(folder / "pcl_corners.npy"), np.load(folder / "img_corners.npy")
-    camera = read_camera(data / "camera_calibration" / "ost.yaml")
-    return Contents(camera, _rigid(pose["R"], pose["T"].ravel()), points, pixels)
+    pose = np.load(root / extrinsics)
+    published = _rigid(pose["R"], pose["T"].ravel())
+    return Contents(read_camera(root / lens), published, np.load(root / points), np.load(root / pixels))
 
 
-def chessboards(root: Path, _: Path) -> Contents:
+def chessboards(root: Path, _: Path, poses: str, published: str, images: str) -> Contents:
     """Find the board and the lens in the images, and take the lidar's board centres; the pose is the mean of 50 runs."""
     import cv2
 
-    folder, grid = root / "data" / "vlp", (7, 5)
     corners_m = np.zeros((35, 3), dtype=np.float32)
     corners_m[:, :2] = 0.105 * (np.mgrid[0:7, 0:5].T.reshape(-1, 2) - np.array([3.0, 2.0]))  # the centre is the origin
     seen = []
     for i in range(40):
-        image = np.asarray(cv2.imread(str(folder / "images" / f"pose{i + 1}.png"), cv2.IMREAD_GRAYSCALE))
-        corners = cv2.findChessboardCorners(image, grid)[1]
+        image = np.asarray(cv2.imread(str(root / images.replace("*", f"{i + 1}")), cv2.IMREAD_GRAYSCALE))
+        corners = cv2.findChessboardCorners(image, (7, 5))[1]
         seen.append(cv2.cornerSubPix(image, corners, (5, 5), (-1, -1), (cv2.TERM_CRITERIA_EPS, 50, 1e-3)))
     height, width = image.shape
     matrix, lens, _turns, shifts = cv2.calibrateCamera([corners_m] * 40, seen, (width, height), None, None)[1:]
     camera = Camera("plumb_bob", width, height, matrix, lens.ravel())
     pixels = camera.project(np.array(shifts)[:, :, 0])
-    rows = list(csv.reader((folder / "poses.csv").open(encoding="utf-8")))
+    rows = list(csv.reader((root / poses).open(encoding="utf-8")))
     centres_mm = np.array([rows[6 + 19 * i] for i in range(40)], dtype=np.float64)
-    runs = np.loadtxt(folder / "calibration_quickstart.csv", delimiter=",", skiprows=1)
+    runs = np.loadtxt(root / published, delimiter=",", skiprows=1)
     return Contents(camera, _mean_of_runs(runs), centres_mm / 1000.0, pixels)
 
 
-def road(root: Path, scratch: Path) -> Contents:
+def road(root: Path, scratch: Path, image: str, radar: str, lens: str, extrinsics: str) -> Contents:
     """Part two names of the radar's header that have grown together, and give the image the time of the first scan."""
-    import json
-
-    data = root / "radar2camera" / "manual_calib" / "data"
-    table = (data / "front_radar.csv").read_text(encoding="utf-8").replace("existobject", "exist,object", 1)
+    table = (root / radar).read_text(encoding="utf-8").replace("existobject", "exist,object", 1)
     (scratch / "radar.csv").write_text(table, encoding="utf-8")
     (scratch / "image").mkdir()
-    (scratch / "image" / f"{table.splitlines()[1].partition(',')[0]}.jpg").write_bytes((data / "0.jpg").read_bytes())
-    lens = json.loads((data / "center_camera-intrinsic.json").read_text())["center_camera-intrinsic"]["param"]
-    matrix, distortion = np.array(lens["cam_K"]["data"]), np.array(lens["cam_dist"]["data"]).ravel()
-    camera = Camera("plumb_bob", lens["img_dist_w"], lens["img_dist_h"], matrix, np.append(distortion, 0.0))
-    pose = read_any_file(data / "radar-to-center_camera-extrinsic.json").camera_from_radar
-    return Contents(camera, pose, recording=scratch)
+    shutil.copy(root / image, scratch / "image" / f"{table.splitlines()[1].partition(',')[0]}.jpg")
+    stated = json.loads((root / lens).read_text())["center_camera-intrinsic"]["param"]
+    matrix, distortion = np.array(stated["cam_K"]["data"]), np.array(stated["cam_dist"]["data"]).ravel()
+    camera = Camera("plumb_bob", stated["img_dist_w"], stated["img_dist_h"], matrix, np.append(distortion, 0.0))
+    return Contents(camera, read_any_file(root / extrinsics).camera_from_radar, recording=scratch)
 
 
-def view_of_delft(root: Path, _: Path) -> Contents:
+def view_of_delft(root: Path, _: Path, *_files: str) -> Contents:
     """Name the folders: all of it is read as it is."""
     radar = root / "example_set" / "radar" / "training"
     pose = read_any_file(radar / "calib" / "00549.txt").camera_from_radar
@@ -107,7 +98,7 @@ _MESSAGE = "std_msgs/Header header\n" + "".join(
 )
 
 
-def two_reflectors(root: Path, scratch: Path) -> Contents:
+def two_reflectors(root: Path, scratch: Path, *_files: str) -> Contents:
     """Write a bag: each radar line of arrays becomes a message, with both azimuths that this radar reports."""
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore

@@ -3,14 +3,16 @@
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
 
 import numpy as np
 
-from benchmarks.real.contents import RealSet
 from benchmarks.real.judging import METHODS, TURNS_DEG, Judged, PoseFigures
+from benchmarks.real.sets import RealSet
 
 __all__ = ["Outcomes", "page", "set_table", "table_csv"]
 
+_UNITS = ("deg", "cm", "px")
 Outcomes = Mapping[RealSet, Judged | str]
 """What was judged, or why it was not."""
 
@@ -20,7 +22,7 @@ Written by `python -m benchmarks.real --data FOLDER --write`; do not edit.
 
 Recordings and pairs that others published, solved as a user would, and compared with the extrinsics that they published. Nothing
 of them is shipped. FOLDER holds their checkouts ([below](#checkouts)); `--only NAME` runs one row, and a set that is not there is
-said in its row. `python -m benchmarks.real --list` needs no data. A further set is a row in `benchmarks/real/sets.py`.
+said in its row. `python -m benchmarks.real --list` needs no data. A further set is a row in `benchmarks/real/sets.toml`.
 
 - **Ours** is the default method with default options, but where [a row](#the-sets) names the noise. **Algorithm 1** is the
   paper's (`--method paper`). **OpenCV** is RANSAC with SQPnP (8 px), then Levenberg-Marquardt on its inliers, from the radar
@@ -80,47 +82,28 @@ def _reference_table(rows: Iterable[RealSet]) -> str:
 
 def table_csv(outcomes: Outcomes) -> str:
     """Return all figures, one line per set."""
+    rows = [{"set": row.name, "commit": row.commit, **_figures(judged)} for row, judged in outcomes.items()]
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    of_poses = [f"{method} {unit}" for method in METHODS for unit in ("deg", "cm", "px")]
-    of_acc = [f"acc {degrees:g} deg" for degrees in TURNS_DEG]
-    last = ("published px", "reach", "verdict", "codes", *of_acc, "returns", "not run")
-    writer.writerow(("set", "commit", "pairs", "set aside", *of_poses, *last))
-    for row, judged in outcomes.items():
-        if isinstance(judged, str):
-            writer.writerow((row.name, row.commit, *[""] * (len(of_poses) + 6 + len(of_acc) + 1), judged))
-            continue
-        figures = [value for method in METHODS for value in _values(judged, method)]
-        shares = [*judged.acc, *[np.nan] * (len(TURNS_DEG) - len(judged.acc))]
-        numbers = [_number(value) for value in (*figures, judged.published_px, judged.reach)]
-        said = (judged.verdict, " ".join(judged.codes))
-        writer.writerow(
-            (
-                row.name,
-                row.commit,
-                judged.pairs,
-                judged.set_aside,
-                *numbers,
-                *said,
-                *map(_number, shares),
-                judged.returns,
-                "",
-            )
-        )
+    writer = csv.DictWriter(text, list(dict.fromkeys(name for row in rows for name in row)), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return text.getvalue()
 
 
-def _values(judged: Judged, method: str) -> tuple[float, float, float]:
-    figures = judged.poses.get(method)
-    return (
-        (np.nan,) * 3
-        if not isinstance(figures, PoseFigures)
-        else (figures.rotation_deg, figures.position_cm, figures.error_px)
-    )
-
-
-def _number(value: float) -> str:
-    return f"{value:.3f}" if np.isfinite(value) else ""
+def _figures(judged: Judged | str) -> dict[str, object]:
+    if isinstance(judged, str):
+        return {"not run": judged}
+    solved = {method: pose for method, pose in judged.poses.items() if isinstance(pose, PoseFigures)}
+    numbers = {
+        f"{method} {unit}": value
+        for method, pose in solved.items()
+        for unit, value in zip(_UNITS, astuple(pose), strict=True)
+    }
+    numbers |= {"published px": judged.published_px, "reach": judged.reach}
+    numbers |= {f"acc {degrees:g} deg": share for degrees, share in zip(TURNS_DEG, judged.acc, strict=False)}
+    stated = {"pairs": judged.pairs, "set aside": judged.set_aside, "returns": judged.returns}
+    said = {"verdict": judged.verdict, "codes": " ".join(judged.codes)}
+    return {**stated, **{name: f"{value:.3f}" for name, value in numbers.items() if np.isfinite(value)}, **said}
 
 
 def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
@@ -133,17 +116,16 @@ def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
         else f"{'yes' if judged.reach <= 1.0 else '**no**'}, {judged.reach:.2f}"
     )
     codes = " ".join(f"`{code}`" for code in judged.codes)
-    methods = (_pose_cell(judged, method) for method in METHODS)
+    methods = (_pose_cell(judged.poses.get(method, "none")) for method in METHODS)
     published = f"{judged.published_px:.1f} px" if np.isfinite(judged.published_px) else ""
     return (row.name, f"{judged.pairs}{aside}", *methods, published, inside, f"{judged.verdict} {codes}".strip())
 
 
-def _pose_cell(judged: Judged, method: str) -> str:
-    figures = judged.poses.get(method, "none")
-    if isinstance(figures, str):
-        return figures
-    degrees, cm, px = _values(judged, method)
-    return f"{px:.1f} px" if not np.isfinite(degrees) else f"{degrees:.2f} deg, {cm:.1f} cm, {px:.1f} px"
+def _pose_cell(pose: PoseFigures | str) -> str:
+    if isinstance(pose, str):
+        return pose
+    apart = f"{pose.rotation_deg:.2f} deg, {pose.position_cm:.1f} cm, " if np.isfinite(pose.rotation_deg) else ""
+    return f"{apart}{pose.error_px:.1f} px"
 
 
 def _acc_cells(row: RealSet, judged: Judged) -> tuple[str, ...]:
