@@ -40,7 +40,7 @@ _ACC = """## Returns in boxes
 """
 _SETS = """## The sets
 
-The licence is what the repository states; where it states none, only these figures are taken from it. Figures in full:
+The license is what the repository states; where it states none, only these figures are taken from it. Figures in full:
 `benchmarks/real/results.csv`.
 """
 
@@ -62,9 +62,9 @@ def page(outcomes: Outcomes) -> str:
 
 def set_table(rows: Sequence[RealSet]) -> str:
     """Return where each set is, and what is read."""
-    head = ("set", "what", "where", "licence", "reads", "sha256")
+    head = ("set", "what", "where", "license", "reads", "sha256")
     cells = (
-        (row.name, row.what, f"{row.repository}@{row.commit[:7]}", row.licence, " ".join(row.files), row.sha256[:12])
+        (row.name, row.what, f"{row.repository}@{row.commit[:7]}", row.license, " ".join(row.files), row.sha256[:12])
         for row in rows
     )
     return _table(head, cells)
@@ -75,8 +75,8 @@ def _reference_table(rows: Iterable[RealSet]) -> str:
     names: dict[tuple[str, ...], list[str]] = {}
     for row in rows:
         where = f"[{row.repository.partition('/')[0]}](https://github.com/{row.repository})"
-        names.setdefault((row.what, where, row.licence, row.bias), []).append(row.name)
-    head = ("set", "what", "where", "licence", "reference")
+        names.setdefault((row.what, where, row.license, row.bias), []).append(row.name)
+    head = ("set", "what", "where", "license", "reference")
     return _table(head, ((", ".join(alike), *cells) for cells, alike in names.items()))
 
 

@@ -23,7 +23,7 @@ class RealSet:
         what: was measured.
         repository: owner/name on GitHub; its checkout is the folder `name`.
         commit: that the checksum is of.
-        licence: as the repository states it.
+        license: as the repository states it.
         files: that are read, or patterns of them, in the checkout.
         sha256: over their names and contents.
         read: makes the contents from the checkout, an empty folder for what it writes, and the files.
@@ -35,7 +35,7 @@ class RealSet:
     what: str
     repository: str
     commit: str
-    licence: str
+    license: str
     files: tuple[str, ...]
     sha256: str
     read: Callable[..., Contents]
