@@ -8,17 +8,7 @@ from collections.abc import Callable, Collection
 from fnmatch import fnmatch
 from pathlib import Path
 
-from benchmarks.accuracy import (
-    advice,
-    clutter,
-    coverage,
-    efficiency,
-    many,
-    mirrored,
-    real,
-    smooth,
-    verdicts,
-)
+from benchmarks.accuracy import efficiency, smooth, verdicts
 from benchmarks.accuracy.defects import (
     adversarial,
     crying_wolf,
@@ -26,77 +16,43 @@ from benchmarks.accuracy.defects import (
     flat_radars,
     handedness,
     measured_positions,
-    several_topics,
     shared_errors,
     two_reflectors,
     wrong_lens,
 )
 from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
-from benchmarks.accuracy.page import page
+from benchmarks.accuracy.page import page, table
 from benchmarks.accuracy.rows import Kept, Row, Section
 from benchmarks.accuracy.running import kept_figures, run
 
 __all__ = ["TABLES", "main", "sections"]
 
 _ROOT = Path(__file__).resolve().parents[2]
-TABLES: dict[str, tuple[Row, ...]] = {
-    "real": real.ROWS,
-    "handedness": handedness.ROWS,
-    "drag": dragging.ROWS,
-    "placements": two_reflectors.ROWS,
-    "returns": two_reflectors.RETURN_ROWS,
-    "topics": several_topics.ROWS,
-    "wolf": crying_wolf.ROWS,
-    "verdict": verdicts.ROWS,
-    "shared": shared_errors.ROWS,
-    "clean": shared_errors.CLEAN_ROWS,
-    "measured": measured_positions.ROWS,
-    "lens": wrong_lens.ROWS,
-    "flat": flat_radars.ROWS,
-    "adversarial": adversarial.ROWS,
-    "mirrored": mirrored.ROWS,
-    "clutter": clutter.ROWS,
-    "smooth": smooth.ROWS,
-    "many": many.ROWS,
-    "advice": advice.ROWS,
-    "coverage": coverage.ROWS,
-    "peers": efficiency.PEER_ROWS,
-    "efficiency": efficiency.ROWS,
+_SECTIONS: dict[str, tuple[tuple[Row, ...], Callable[[Kept], Section]]] = {
+    "shared": (shared_errors.ROWS, shared_errors.section),
+    "smooth": (smooth.ROWS, smooth.section),
+    "verdict": (verdicts.ROWS, verdicts.section),
+    "measured": (measured_positions.ROWS, measured_positions.section),
+    "defects": (adversarial.ROWS, adversarial.section),
+    "warnings": (crying_wolf.ROWS, crying_wolf.section),
+    "handedness": (handedness.ROWS, handedness.section),
+    "lens": (wrong_lens.ROWS, wrong_lens.section),
+    "flat": (flat_radars.ROWS, flat_radars.section),
+    "returns": (two_reflectors.ROWS, two_reflectors.section),
+    "drag": (dragging.ROWS, dragging.section),
+    "bound": (efficiency.ROWS, efficiency.section),
 }
-"""The rows by their name for --only, in the order they are measured: the longest table is last."""
+"""The rows of each question by its name for --only, and what judges them, in the order of the page."""
+TABLES = {name: rows for name, (rows, _) in _SECTIONS.items()}
 
 
-_SECTIONS: dict[str, Callable[[Kept], Section]] = {
-    "verdict": verdicts.section,
-    "shared": shared_errors.section,
-    "clean": shared_errors.clean_section,
-    "measured": measured_positions.section,
-    "lens": wrong_lens.section,
-    "adversarial": adversarial.section,
-    "wolf": crying_wolf.section,
-    "flat": flat_radars.section,
-    "handedness": handedness.section,
-    "drag": dragging.section,
-    "placements": two_reflectors.section,
-    "returns": two_reflectors.returns_section,
-    "topics": several_topics.section,
-    "efficiency": efficiency.section,
-    "peers": efficiency.peer_section,
-    "coverage": coverage.section,
-    "clutter": clutter.section,
-    "smooth": smooth.section,
-    "many": many.section,
-    "real": real.section,
-    "mirrored": mirrored.section,
-    "advice": advice.section,
-}
-"""The section of each table, in the order of the page."""
-
-
-def sections(kept: Kept, only: Collection[str] = ()) -> tuple[Section, ...]:
-    """Return the sections of all tables, or of some only, in the order of the page."""
-    return tuple(write(kept) for name, write in _SECTIONS.items() if not only or name in only)
+def sections(kept: Kept, only: Collection[str] = ()) -> dict[str, Section]:
+    """Return what was measured of all questions, or of some only, in the order of the page."""
+    measured = {
+        name: judge(kept) for name, (rows, judge) in _SECTIONS.items() if any(kept.get(row.key) for row in rows)
+    }
+    return {name: section for name, section in measured.items() if not only or name in only}
 
 
 def _arguments() -> argparse.Namespace:
@@ -118,6 +74,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
     parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "accuracy.md", help="the page that is written")
+    parser.add_argument(
+        "--tables", type=Path, default=Path(__file__).with_name("tables"), help="the folder of the detailed tables"
+    )
     parser.add_argument("--write-only", action="store_true", help="write the page from kept figures, measure nothing")
     parser.add_argument(
         "--kept", type=Path, help="continue with this folder of raw figures, whatever version of the code made it"
@@ -143,7 +102,11 @@ def main() -> int:
     command = "make bench-accuracy SEED=fresh" if fresh else "make bench-accuracy"
     if arguments.alone:
         command = shlex.join(["python", "-m", "benchmarks.accuracy", *sys.argv[1:]])
-    text = page(sections(kept, alone), commit="" if fresh is None else fresh.commit, command=command)
+    measured = sections(kept, alone)
+    arguments.tables.mkdir(parents=True, exist_ok=True)
+    for name, section in measured.items():
+        (arguments.tables / f"{name}.csv").write_text(table(section.rows), encoding="utf-8")
+    text = page(measured, commit="" if fresh is None else fresh.commit, command=command)
     arguments.page.write_text(text, encoding="utf-8")
     return 0
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.accuracy.rows import Claim, Figures, Kept
+from benchmarks.accuracy.rows import Claim, Figures
 
 __all__ = [
     "MET",
@@ -15,11 +15,13 @@ __all__ = [
     "at_least",
     "at_most",
     "column",
-    "fewest",
-    "joined",
+    "counted",
+    "low",
     "ratio",
+    "rmse",
     "share",
-    "summed_up",
+    "stated_over_rmse",
+    "tally",
     "within",
     "worst",
 ]
@@ -98,21 +100,36 @@ def worst(verdicts: Iterable[str]) -> str:
     return max(verdicts, key=order.index, default="not run")
 
 
-def joined(verdicts: Sequence[str]) -> str:
-    """Write several verdicts into one cell, or one if they agree."""
-    return " / ".join(verdicts) if len(set(verdicts)) > 1 else next(iter(verdicts), "")
+def low(covered: Measured) -> bool:
+    """Return whether a share that is stated to be 95 % is significantly below."""
+    return at_least(covered, 95.0) == MISSED
 
 
-def fewest(kept: Kept, keys: Iterable[str]) -> str:
-    """Return text with the smallest number of trials of the rows that were run."""
-    counts = [len(kept[key]) for key in keys if kept.get(key)]
-    return f"{min(counts):,} trials or more a row" if counts else ""
+def counted(count: float, total: int) -> Measured:
+    """Return the share of a count."""
+    return share((np.arange(total) < count).astype(np.float64))
 
 
-def summed_up(aim: str, verdicts: Sequence[str], trials: str) -> Claim:
-    """Combine the verdicts of several rows into one claim."""
-    if not verdicts:
-        return Claim(aim, "not run", "not run")
-    counts = [(name, verdicts.count(name)) for name in (MET, UNDECIDED, MISSED) if verdicts.count(name)]
-    found = ", ".join(f"{count} {name.strip('*')}" for name, count in counts)
-    return Claim(aim, f"of {len(verdicts)} figures: {found}; {trials}", worst(verdicts))
+def rmse(trials: Sequence[Figures], name: str) -> float:
+    """Return the root mean square of one figure over the trials that have it."""
+    return float(np.sqrt(np.nanmean(column(trials, name) ** 2)))
+
+
+def stated_over_rmse(trials: Sequence[Figures], stated: str, name: str) -> Measured:
+    """Return the mean stated sigma over the RMSE; two standard errors from those of the mean of the squares."""
+    sigmas, errors = column(trials, stated), column(trials, name)
+    used = np.isfinite(sigmas) & np.isfinite(errors)
+    if used.sum() < 2:
+        return Measured(float("nan"), float("nan"))
+    squares = errors[used] ** 2
+    value = float(sigmas[used].mean() / np.sqrt(squares.mean()))
+    return Measured(value, float(value * np.std(squares, ddof=1) / np.sqrt(used.sum()) / squares.mean()))
+
+
+def tally(aim: str, judged: Sequence[tuple[str, str, str]]) -> Claim:
+    """Combine rows, each a name, a figure and a verdict, into one claim that names every row that is not met."""
+    counts = [f"{sum(verdict == MET for _, _, verdict in judged)} of {len(judged)} met"]
+    for kind in (MISSED, UNDECIDED):
+        names = [f"{name} {figure}" for name, figure, verdict in judged if verdict == kind]
+        counts += [f"{kind.strip('*')}: {', '.join(names)}"] if names else []
+    return Claim(aim, "; ".join(counts), worst(verdict for _, _, verdict in judged))

@@ -17,7 +17,7 @@ from calib_core.paper.pnp import refine_lm, solve_pnp
 from calib_core.radar import sigma_polar_of
 from calib_core.results import Calibration
 
-__all__ = ["NOT_RUN", "PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
+__all__ = ["PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
 
 Method = Callable[[SimulatedPairs, Case], "RigidTransform | None"]
 
@@ -162,12 +162,6 @@ PEERS: dict[str, Method] = {
     "GMLPnP": _gmlpnp,
     "bias-compensated PnP": _bias_compensated,
 }
-NOT_RUN = {
-    "CaRaCTO": "not reproduced: made for radars without elevation, and its equations are not in the text that could be had",
-    "3DUPnP": "not reproduced to the letter: only its beginning could be had; the row of bias-compensated PnP follows the two "
-    "steps that it states",
-}
-"""Methods of the field without a row of their own, and why."""
 
 _MODULES = {"PoseLib": "poselib", "pycolmap": "pycolmap"}
 

@@ -1,16 +1,33 @@
 """One outcome as raw figures: its errors, its stated uncertainty, and the codes of its warnings."""
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import get_args
 
 import numpy as np
 
+from benchmarks.accuracy.figures import column
 from benchmarks.accuracy.rows import Figures
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
+from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
 
-__all__ = ["codes_in", "named", "outcome_figures", "quantile_999", "silently_wrong", "solved_or_refused"]
+__all__ = [
+    "LEVELS",
+    "codes_in",
+    "inside",
+    "level_counts",
+    "misleading",
+    "named",
+    "outcome_figures",
+    "quantile_999",
+    "silently_wrong",
+    "sold",
+    "solved_or_refused",
+]
+
+LEVELS: tuple[VerdictLevel, ...] = get_args(VerdictLevel)
 
 _CODE = "code "
 _CHI2_95, _CHI2_999 = 12.591587243743977, 22.457744484825323  # of 6 parameters
@@ -26,23 +43,57 @@ def solved_or_refused(solve: Callable[[], Calibration | Unsolvable]) -> Calibrat
 
 
 def outcome_figures(outcome: Calibration | Unsolvable, truth: RigidTransform) -> Figures:
-    """Return errors and stated sigmas [rad, m], the squared Mahalanobis distance of the truth, and a figure for every code."""
+    """Return errors and stated sigmas [rad, m], the squared Mahalanobis distance of the truth, and a figure for every code.
+
+    "level" is the verdict's, and "as told" 1 if rotation and camera position are both within the verdict's 95 % figures.
+    """
+    level = {"level": float(LEVELS.index(verdict_on(outcome).level))}
     if isinstance(outcome, Unsolvable):
-        return {f"{_CODE}{outcome.code}": 1.0, "squared": None}
+        return {f"{_CODE}{outcome.code}": 1.0, "squared": None} | level
     pose, covariance = outcome.camera_from_radar, outcome.covariance
     error = truth.error_from(pose)
     to_centre = camera_position_jacobian(pose)
     away_m = pose.inverse().translation_m - truth.inverse().translation_m
     stated = bool(np.isfinite(covariance).all())
     codes: Figures = {f"{_CODE}{warning.code}": 1.0 for warning in outcome.warnings}
-    return codes | {
-        "rotation_rad": float(np.linalg.norm(error[3:])),
-        "position_m": float(np.linalg.norm(away_m)),
-        "stated_rad": float(np.sqrt(np.trace(covariance[3:, 3:]))) if stated else None,
-        "stated_m": float(np.sqrt(np.trace(to_centre @ covariance @ to_centre.T))) if stated else None,
-        "squared": float(error @ np.linalg.solve(covariance, error)) if stated else None,
-        "quantile": outcome.covariance_quantile,
-    }
+    return (
+        codes
+        | level
+        | {
+            "rotation_rad": float(np.linalg.norm(error[3:])),
+            "position_m": float(np.linalg.norm(away_m)),
+            "stated_rad": float(np.sqrt(np.trace(covariance[3:, 3:]))) if stated else None,
+            "stated_m": float(np.sqrt(np.trace(to_centre @ covariance @ to_centre.T))) if stated else None,
+            "squared": float(error @ np.linalg.solve(covariance, error)) if stated else None,
+            "quantile": outcome.covariance_quantile,
+            "as told": _as_told(outcome, error[3:], 100.0 * float(np.linalg.norm(away_m))) if stated else None,
+        }
+    )
+
+
+def _as_told(outcome: Calibration, turned_rad: np.ndarray, away_cm: float) -> float:
+    """Return 1 if both errors are at most those that the verdict states; a radar without elevation states its yaw only."""
+    told = stated_error(outcome)
+    yaw_rad = (outcome.camera_from_radar.rotation.T @ turned_rad)[2]
+    turned_deg = np.rad2deg(abs(yaw_rad) if told.in_plane else np.linalg.norm(turned_rad))
+    return float(turned_deg <= told.rotation_deg and not away_cm > told.position_cm)
+
+
+def sold(trials: Sequence[Figures]) -> np.ndarray:
+    """Flag the trials whose verdict is good or usable."""
+    return column(trials, "level") <= LEVELS.index("usable")
+
+
+def level_counts(trials: Sequence[Figures]) -> dict[str, str]:
+    """Return how many trials have each level."""
+    levels = column(trials, "level")
+    return {level: str(int((levels == place).sum())) for place, level in enumerate(LEVELS)}
+
+
+def inside(trials: Sequence[Figures]) -> np.ndarray:
+    """Flag the trials whose truth lies inside the stated 95 % ellipsoid; NaN without a pose."""
+    squared, quantile = column(trials, "squared"), column(trials, "quantile")
+    return np.where(np.isfinite(squared), squared <= quantile, np.nan)
 
 
 def quantile_999(quantile_95: float) -> float:
@@ -77,11 +128,18 @@ def silently_wrong(trials: Sequence[Figures], codes: Iterable[str], *, always_wr
         codes: warnings that name the cause.
         always_wrong: no pose is true of such pairs, so every pose without a code is silently wrong.
     """
+    return _outside(trials, codes, _FAR, always_wrong=always_wrong)
+
+
+def misleading(trials: Sequence[Figures], codes: Iterable[str], *, always_wrong: bool = False) -> np.ndarray:
+    """Flag trials, of any verdict, whose truth is outside the stated 99.9 % quantile itself, without such a code."""
+    return _outside(trials, codes, 1.0, always_wrong=always_wrong)
+
+
+def _outside(trials: Sequence[Figures], codes: Iterable[str], times: float, *, always_wrong: bool) -> np.ndarray:
     flags = []
     for figures in trials:
         squared, quantile = figures.get("squared"), figures.get("quantile")
-        far = always_wrong or (
-            squared is not None and quantile is not None and not squared <= _FAR * quantile_999(quantile)
-        )
-        flags.append(far and not named(figures, codes))
+        far = squared is not None and quantile is not None and not squared <= times * quantile_999(quantile)
+        flags.append((far or always_wrong) and not named(figures, codes))
     return np.array(flags, dtype=np.bool_)

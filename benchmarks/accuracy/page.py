@@ -1,80 +1,94 @@
-"""Write docs/accuracy.md from kept figures."""
+"""Write docs/accuracy.md and its tables from kept figures."""
 
-from collections.abc import Sequence
+import csv
+import io
+from collections.abc import Mapping, Sequence
 
-from benchmarks.accuracy.rows import Part, Section
+from benchmarks.accuracy.figures import MISSED
+from benchmarks.accuracy.rows import Section
 
-__all__ = ["page"]
+__all__ = ["page", "table"]
 
 _HEAD = """# Accuracy
 
-Written by `COMMAND`; do not edit.
+Written by `{command}`; do not edit. Each question has a short table of aims here, and all its rows, with the
+aim and the verdict of each, in a file beside the benchmark. Real pairs and recordings have [a page of their own](real.md).
 
 ## What a user may conclude
 
-- **The stated 95 % holds.** Where radar, lens, clicks and measured position are wrong as real ones are, the stated region
-  contains the truth in about 95 % of the draws: with 12 to 40 pairs, one in ten of them wrong, with and without a measured
-  camera position. Where 25, 49 or 81 % of the variance of the radar's angles are smooth over direction (lengths of
-  10 to 40 deg), it does in 97, 96 and 91 % of 160 draws each, and in 99 % of 520 without
-  (`python -m benchmarks.accuracy.coverage_guard`).
-- **Measure the camera position.** With a TI radar and 20 pairs it brings the position from about 15 cm to a few, and shows what
-  pairs alone cannot. One that is 3 to 11 cm off is covered by the stated error; one that is 30 cm off is named in at least
-  nine of ten draws, and loses its weight in the pose. Of right ones, one in fifty or fewer is called doubtful.
-- **The radar decides the angles:** about half a degree with an imaging radar, about one degree with a TI radar, several with a
-  TI radar in a narrow aisle, where the verdict says coarse.
+- **The stated 95 % holds** if radar, lens, clicks and measured position are wrong by no more than the options state, with
+  12 pairs or more spread over the image, about one in ten of them wrong, and right axes, units and intrinsics.
+{outside}
+- **Measure the camera position.** {tape}
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
   alike, a cropped image. The verdict says that it assumes none of them. A measured position shows the first two; a turn, such
-  as that of a cropped image, it shows with an imaging radar only.
-- An answer that is far off, calls itself good or usable and names no cause is *silently wrong*. The tables count them.
+  as that of a cropped image, it shows with an imaging radar at best.
+- **{missed} of {aims} aims are missed.** They are in bold below, with the rows that miss them.
 
 ## How it was measured
 
-Everything except the real pairs is simulated, with a seed per trial: the figures do not depend on the number of processors, and
-every method gets the same draws. SEEDS
-"Default" rows draw the errors that real radars, lenses and clicks have from the priors that the options state, and solve with
-the default options. "Ideal" rows have nothing but independent noise, and the estimator is told so; the Cramer-Rao bound assumes
-the same.
+Everything is simulated, with a seed per set, so that the number of processors changes no figure. {seeds}
 
-Noise levels are assumptions based on
-vendors' figures; no real radar was measured. `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
+Noise levels are assumptions from vendors' figures: `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
 `ti_aisle` the same in a narrow aisle (2 cm, 0.8, 2), `ti_fine` with interpolated peaks (0.8 cm, 0.2, 0.7), `imaging` an imaging
-radar (3 cm, 0.12, 0.25); clicks have 2 px of noise in a 1920 x 1080 image with a field of view of 75 deg. The field scene
-extends from 2 to 20 m, the aisle is 2.4 m wide and 15 m long.
+radar (3 cm, 0.12, 0.25); clicks have 2 px in a 1920 x 1080 image of 75 deg. Placements are 2 to 20 m away. "Free" means that
+the camera position is not measured, "tape" that it is, to 1 cm per axis. *Inside*: the true pose is in the stated 95 %
+ellipsoid. *Good*, *usable* and *coarse* are the verdict's levels.
 
-The figure after ± is two standard errors. "Met": the figure reaches the aim. "Undecided": it does not, but by less than two
-standard errors, so more trials would be needed. "Missed": it misses the aim significantly; even if nothing is wrong, about
-one row in forty is missed by chance.
+After ± are two standard errors. "Met": the figure reaches the aim. "Undecided": it does not, by less than two standard errors.
+"Missed": by more; of forty rows where nothing is wrong, one is missed by chance.
 """
 
 _FIXED = "The draws are those of fixed seeds, which development may have seen."
-_FRESH = "The draws come from a commit's hash, {commit}, after the code was written: nobody had seen them."
+_FRESH = "The draws come from the hash of commit {commit}, after the code was written: nobody had seen them."
 
 
-def page(sections: Sequence[Section], *, commit: str = "", command: str = "make bench-accuracy") -> str:
+def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "make bench-accuracy") -> str:
     """Return the page in Markdown; what was not measured is left out.
 
     Args:
-        sections: the measured tables, and empty ones.
+        sections: the measured questions by the name of their table.
         commit: whose hash gave the seeds; empty for the fixed ones.
         command: what wrote the page.
     """
-    shown = [section for section in sections if any(part.cells for part in section.parts)]
-    head = _HEAD.replace("COMMAND", command).replace("SEEDS", _FRESH.format(commit=commit[:7]) if commit else _FIXED)
-    aims = tuple(
-        (one.aim, one.measured, one.verdict) for section in shown for one in section.claims if one.verdict != "not run"
+    claims = [claim for section in sections.values() for claim in section.claims]
+    outside = [f"  - {section.title} {'; '.join(section.outside)}." for section in sections.values() if section.outside]
+    head = _HEAD.format(
+        command=command,
+        outside="\n".join(["  It does not, and fewer are inside, in these rows:", *outside] if outside else []),
+        tape=_tape(sections),
+        missed=sum(claim.verdict == MISSED for claim in claims),
+        aims=len(claims),
+        seeds=_FRESH.format(commit=commit[:7]) if commit else _FIXED,
     )
-    table = _table(Part("", ("aim", "measured", ""), aims))
-    return "\n".join([head, "## Aims\n", table, *map(_section, shown)])
+    return "\n".join([head, *(_section(name, section) for name, section in sections.items())])
 
 
-def _section(section: Section) -> str:
-    tables = [_table(part) for part in section.parts if part.cells]
-    return "\n".join([f"## {section.title}\n", section.text + "\n", *tables])
+def _tape(sections: Mapping[str, Section]) -> str:
+    """Say what a position to 1 cm changes with 20 pairs."""
+    rows = {row["row"]: row for row in sections["shared"].rows} if "shared" in sections else {}
+    told = []
+    for noise in ("ti", "imaging"):
+        ends = [rows.get(f"{noise} 20 {known}") for known in ("free", "tape")]
+        errors = [f"{row['rotation [deg]']} deg and {row['position [cm]']} cm" for row in ends if row]
+        told += [f"with `{noise}`, {' become '.join(errors)}"] if errors else []
+    return f"With 20 pairs (RMSE): {'; '.join(told)}."
 
 
-def _table(part: Part) -> str:
-    lines = [f"### {part.title}\n"] if part.title else []
-    lines.append("| " + " | ".join(part.head) + " |")
-    lines.append("|---" * len(part.head) + "|")
-    lines += ["| " + " | ".join(row) + " |" for row in part.cells]
+def _section(name: str, section: Section) -> str:
+    lines = [
+        f"## {section.title}\n",
+        section.text + f" All rows: [{name}.csv](../benchmarks/accuracy/tables/{name}.csv).\n",
+    ]
+    lines += ["| aim | measured |  |", "|---|---|---|"]
+    lines += [f"| {claim.aim} | {claim.measured} | {claim.verdict} |" for claim in section.claims]
     return "\n".join(lines) + "\n"
+
+
+def table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Write rows of the same columns as CSV."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: value.replace("**", "") for name, value in row.items()} for row in rows)
+    return stream.getvalue()

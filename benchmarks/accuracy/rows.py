@@ -1,9 +1,9 @@
-"""The parts of a table: rows that are measured trial by trial, and the text about them."""
+"""What is measured trial by trial, and what a question's answer consists of."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Claim", "Figures", "Kept", "Part", "Row", "Section"]
+__all__ = ["Claim", "Figures", "Kept", "Row", "Section"]
 
 Figures = dict[str, float | None]
 """The raw figures of one trial by name, as kept on disk; None if there is no figure (no pose)."""
@@ -37,32 +37,19 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """A table.
-
-    Attributes:
-        title: heading; may be empty.
-        head: column headings.
-        cells: row by row.
-    """
-
-    title: str
-    head: tuple[str, ...]
-    cells: tuple[tuple[str, ...], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Section:
     """One question and its answer.
 
     Attributes:
         title: the question.
         text: how it was measured.
-        parts: the tables.
-        claims: the aims.
+        claims: the aims, the table of the page.
+        rows: the detailed table, a file beside the benchmark; each row has the same columns.
+        outside: rows where the stated 95 % does not hold, with the share inside.
     """
 
     title: str
     text: str
-    parts: tuple[Part, ...]
     claims: tuple[Claim, ...]
+    rows: tuple[Mapping[str, str], ...] = ()
+    outside: tuple[str, ...] = ()

@@ -1,4 +1,7 @@
-"""Measure rows trial by trial on an engine. Neither the number of workers nor an interruption changes a figure."""
+"""Measure rows trial by trial on an engine. Neither the number of workers nor an interruption changes a figure.
+
+All rows advance together, so that a run that is cut has measured the same share of each.
+"""
 
 import sys
 import time
@@ -11,7 +14,7 @@ from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["kept_figures", "run"]
 
-_CHUNK = 10
+_CHUNK = 4
 
 _Measured = list[tuple[int, Figures]]
 
@@ -20,13 +23,14 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
     """Measure the trials that are not kept yet.
 
     Args:
-        rows: in the order in which they are measured.
+        rows: what is measured.
         keeper: stores the figures.
         jobs: number of worker processes, one thread each; 1 measures in this process.
         most: largest number of trials per row.
         first: number of the first trial; other numbers are other draws.
     """
     chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most, first)]
+    chunks.sort(key=lambda chunk: (chunk[1][0] - first) / _wanted(chunk[0], most))
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
     engine: Engine = InProcess() if jobs == 1 else WorkerProcesses(jobs)
     for number, measured in engine.run_all(_measure, chunks):

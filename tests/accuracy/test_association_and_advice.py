@@ -1,9 +1,10 @@
-"""A short version of `make bench-accuracy`: clutter, mirrored axes, advice."""
+"""Other objects in the radar's view do not get a placement, and advised placements determine the pose better."""
 
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.advice import Advised, measure_advice
+from benchmarks.accuracy.advice import measure_advice
+from benchmarks.accuracy.cases import Case
 from benchmarks.accuracy.clutter import SCENES, measure_clutter
 
 _OF_SCENE = {scene.name: scene for scene in SCENES}
@@ -25,6 +26,6 @@ def test_no_placement_gets_the_position_of_something_else(scene):
 
 
 def test_advice_shrinks_the_rotation_sigma_at_equal_numbers():
-    trials = [measure_advice(Advised("ti", 10, None), trial) for trial in range(4)]
+    trials = [measure_advice(Case("ti", 10, tape_m=None), trial) for trial in range(4)]
     before, after = (np.array([trial[name] for trial in trials]) for name in ("sigma_rad", "advised_sigma_rad"))
     assert np.sqrt((before**2).mean() / (after**2).mean()) > 1.2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.cases import Case, draw
-from benchmarks.accuracy.methods import NOT_RUN, PEERS, sqpnp_lm
+from benchmarks.accuracy.methods import PEERS, sqpnp_lm
 from benchmarks.accuracy.reproduced import bias_compensated_pnp, gmlpnp, unbiased_positions
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -92,8 +92,3 @@ def simulated_at(simulated: SimulatedPairs, points: np.ndarray) -> SimulatedPair
         for pair, point in zip(simulated.pairs, points, strict=True)
     ]
     return replace(simulated, pairs=tuple(pairs))
-
-
-def test_methods_without_a_row_say_why():
-    assert all("not reproduced" in why for why in NOT_RUN.values())
-    assert not set(NOT_RUN) & set(PEERS)

@@ -13,7 +13,7 @@ from benchmarks.accuracy.efficiency import failed, measure_ours
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, Measured, at_most, ratio, share, within
 from benchmarks.accuracy.fresh_seeds import FreshSeeds, fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
-from benchmarks.accuracy.page import page
+from benchmarks.accuracy.page import page, table
 from benchmarks.accuracy.rows import Figures, Row
 from benchmarks.accuracy.running import kept_figures, run
 
@@ -78,25 +78,53 @@ def test_the_page_names_met_and_missed_aims():
     bad = good | {"rotation_rad": 0.02}
     key = f"ours-{Case('ti', 20, 0.1, tape_m=None).key}"
     for figures, verdict in ((good, MET), (bad, MISSED)):
-        text = page(sections({key: [figures, figures, figures]}))
-        line = next(line for line in text.splitlines() if line.startswith("| ti | 20 | 3 |"))
-        assert verdict in line
-        assert "times the Cramer-Rao bound" in text
+        measured = sections({key: [figures, figures, figures]})
+        (claim, _) = measured["bound"].claims
+        assert claim.verdict == verdict
+        assert f"| {claim.aim} | {claim.measured} | {verdict} |" in page(measured)
+
+
+SOUND: Figures = {
+    **{"rotation_rad": 0.01, "position_m": 0.01, "stated_rad": 0.01, "stated_m": 0.01},
+    **{"squared": 3.0, "quantile": 13.0, "level": 1.0, "as told": 1.0},
+}
 
 
 def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run():
-    figures = {
-        "rotation_rad": 0.01,
-        "position_m": 0.01,
-        "stated_rad": 0.01,
-        "stated_m": 0.01,
-        "squared": 3.0,
-        "quantile": 13.0,
-    }
-    text = page(sections({"shared-field-ti-12-10pc-free": [figures] * 3}), commit=40 * "a")
-    assert "hash, aaaaaaa," in text
-    assert text.count("| field | ti | 12 | 10% | free | 3 |") == 1
-    assert "| not run |" not in text
+    measured = sections({"shared-field-ti-12-10pc-free": [SOUND] * 3})
+    assert list(measured) == ["shared"]
+    text = page(measured, commit=40 * "a")
+    assert "commit aaaaaaa," in text
+    assert "not run" not in text
+    assert table(measured["shared"].rows).splitlines()[1].startswith("ti 12 free,3,")
+
+
+def test_rows_that_hold_the_truth_too_rarely_are_named_with_the_promise():
+    rare = [SOUND] * 10 + [SOUND | {"squared": 20.0}] * 10
+    text = page(sections({"shared-field-ti-12-10pc-free": rare}))
+    assert "ti 12 free (50 %)" in text.partition("## How it was measured")[0]
+
+
+def test_every_row_of_the_errors_that_all_pairs_share_has_an_aim():
+    measured = sections({row.key: [SOUND] * 3 for row in TABLES["shared"]})
+    assert len(measured["shared"].rows) == len(TABLES["shared"])
+    assert all(row[aim] for row in measured["shared"].rows for aim in ("aim inside", "aim sigma", "aim position"))
+
+
+def test_a_run_that_is_cut_has_measured_the_same_share_of_each_row(tmp_path):
+    rows = [
+        Row("short", 8, lambda trial: {"trial": float(trial)}),
+        Row("long", 16, lambda trial: {"trial": float(trial)}),
+    ]
+    order: list[str] = []
+
+    class Noting(Keeper):
+        def add(self, key, trials):
+            order.append(key)
+            super().add(key, trials)
+
+    run(rows, Noting(tmp_path), jobs=1)
+    assert order == ["short", "long", "long", "short", "long", "long"]
 
 
 def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant():

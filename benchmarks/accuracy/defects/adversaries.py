@@ -19,6 +19,7 @@ from benchmarks.simulated_pairs import (
     study_camera,
 )
 from calib_core.calibration import calibrate_pairs
+from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
@@ -127,6 +128,6 @@ def draw_flat(
         rig = random_rig(rng, camera=study_camera(), options=options)
         try:
             return simulate_pairs(count, rng=rng, noise=noise, rig=rig, systematic=errors)
-        except ValueError:  # the camera looks away from the ground
+        except OptionError:  # the camera looks away from the ground
             continue
-    raise ValueError(f"no tilt and height with {count} placements in view")
+    raise OptionError(f"no tilt and height with {count} placements in view")
