@@ -74,7 +74,7 @@ bench: dev  ## Measure speed, as ratios within one run; write docs/speed.md. BEN
 	$(BIN)/python -m benchmarks.speed $(BENCH)
 
 bench-accuracy: SEED ?= fixed
-bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md (an hour or two). SEED=fresh: draws from the commit's hash.
+bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md and its tables (about 40 min on one core). SEED=fresh: draws from the commit's hash.
 	$(BIN)/python -m benchmarks.accuracy --seed $(SEED) $(ACCURACY)
 
 paper: dev  ## Repeat the paper's experiments on simulated sessions; write docs/paper-experiments.md and its figures.

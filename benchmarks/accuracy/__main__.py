@@ -64,7 +64,7 @@ def _arguments() -> argparse.Namespace:
         "--rows", action="append", help="measure rows with such a key only, such as 'peers-*-20-*'; may be repeated"
     )
     parser.add_argument("--alone", action="store_true", help="write the tables of --only and no others")
-    parser.add_argument("--trials", type=int, default=None, help="largest number of trials per row")
+    parser.add_argument("--trials", type=int, default=None, help="sets per row instead of its own number")
     parser.add_argument(
         "--seed",
         choices=("fixed", "fresh"),
@@ -95,9 +95,9 @@ def main() -> int:
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
     rows = [row for row in rows if not arguments.rows or any(fnmatch(row.key, one) for one in arguments.rows)]
     if not arguments.write_only:
-        run(rows, keeper, jobs=arguments.jobs, most=arguments.trials, first=first)
+        run(rows, keeper, jobs=arguments.jobs, trials=arguments.trials, first=first)
     everything = [row for several in TABLES.values() for row in several]
-    kept = kept_figures(everything, keeper, most=arguments.trials, first=first)
+    kept = kept_figures(everything, keeper, trials=arguments.trials, first=first)
     alone = arguments.only if arguments.alone and arguments.only else ()
     command = "make bench-accuracy SEED=fresh" if fresh else "make bench-accuracy"
     if arguments.alone:

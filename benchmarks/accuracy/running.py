@@ -19,18 +19,18 @@ _CHUNK = 4
 _Measured = list[tuple[int, Figures]]
 
 
-def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = None, first: int = 0) -> None:
+def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, trials: int | None = None, first: int = 0) -> None:
     """Measure the trials that are not kept yet.
 
     Args:
         rows: what is measured.
         keeper: stores the figures.
         jobs: number of worker processes, one thread each; 1 measures in this process.
-        most: largest number of trials per row.
+        trials: of each row; None takes the row's own number.
         first: number of the first trial; other numbers are other draws.
     """
-    chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most, first)]
-    chunks.sort(key=lambda chunk: (chunk[1][0] - first) / _wanted(chunk[0], most))
+    chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, trials, first)]
+    chunks.sort(key=lambda chunk: (chunk[1][0] - first) / (trials or chunk[0].trials))
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
     engine: Engine = InProcess() if jobs == 1 else WorkerProcesses(jobs)
     for number, measured in engine.run_all(_measure, chunks):
@@ -39,22 +39,18 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
         progress.report(row.key, len(measured))
 
 
-def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None, first: int = 0) -> Kept:
+def kept_figures(rows: Sequence[Row], keeper: Keeper, *, trials: int | None = None, first: int = 0) -> Kept:
     """Read the kept figures in order of the trial number, from the first one up to the wanted number of trials."""
     kept = {}
     for row in rows:
-        trials = keeper.read(row.key)
-        kept[row.key] = tuple(trials[trial] for trial in sorted(trials) if first <= trial < first + _wanted(row, most))
+        read, past = keeper.read(row.key), first + (trials or row.trials)
+        kept[row.key] = tuple(read[trial] for trial in sorted(read) if first <= trial < past)
     return kept
 
 
-def _wanted(row: Row, most: int | None) -> int:
-    return row.trials if most is None else min(row.trials, most)
-
-
-def _missing(row: Row, keeper: Keeper, most: int | None, first: int) -> list[list[int]]:
+def _missing(row: Row, keeper: Keeper, trials: int | None, first: int) -> list[list[int]]:
     kept = keeper.read(row.key)
-    missing = [trial for trial in range(first, first + _wanted(row, most)) if trial not in kept]
+    missing = [trial for trial in range(first, first + (trials or row.trials)) if trial not in kept]
     return [missing[i : i + _CHUNK] for i in range(0, len(missing), _CHUNK)]
 
 

@@ -30,11 +30,11 @@ def never(trial: int) -> Figures:
 
 def test_an_interrupted_run_resumes_where_it_stopped(tmp_path):
     keeper = Keeper(tmp_path)
-    run([row()], keeper, jobs=1, most=3)
+    run([row()], keeper, jobs=1, trials=3)
     path = tmp_path / f"{row().key}.jsonl"
     path.write_text(path.read_text() + '{"trial": 3, "fig')  # killed in the middle of a line
     assert len(kept_figures([row()], keeper)[row().key]) == 3
-    run([row()], keeper, jobs=1, most=5)
+    run([row()], keeper, jobs=1, trials=5)
     again = kept_figures([row()], keeper)[row().key]
     assert again == tuple(measure_ours(CASE, trial) for trial in range(5))
     run([Row(row().key, 5, never)], keeper, jobs=1)
@@ -52,8 +52,8 @@ def test_fresh_seeds_are_other_trials_of_the_same_row_and_are_kept_next_to_the_f
     assert len(fresh.commit) == 40
     assert FreshSeeds("00000001" + 32 * "0").first_trial - FreshSeeds(40 * "0").first_trial > 10_000
     keeper = Keeper(tmp_path)
-    run([row()], keeper, jobs=1, most=2)
-    run([row()], keeper, jobs=1, most=3, first=fresh.first_trial)
+    run([row()], keeper, jobs=1, trials=2)
+    run([row()], keeper, jobs=1, trials=3, first=fresh.first_trial)
     fixed = kept_figures([row()], keeper)[row().key]
     others = kept_figures([row()], keeper, first=fresh.first_trial)[row().key]
     assert (len(fixed), len(others)) == (2, 3)

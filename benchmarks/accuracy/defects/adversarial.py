@@ -10,6 +10,7 @@ from benchmarks.accuracy.defects.adversaries_of_pairs import ADVERSARIES_OF_PAIR
 from benchmarks.accuracy.defects.adversaries_of_scans import ADVERSARIES_OF_SCANS
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, column, low, share
 from benchmarks.accuracy.outcomes import (
+    LEVELS,
     codes_in,
     inside,
     level_counts,
@@ -25,6 +26,7 @@ __all__ = ["ALL", "ROWS", "highest_share", "measure_adversary", "section", "sile
 
 _TRIALS, _GAUGE_TRIALS, _SESSIONS = 24, 12, 4
 _HIGHEST_SHARE = 0.001
+_CONTRADICTORY = LEVELS.index("contradictory")
 ALL: Mapping[str, Adversary] = {one.key: one for one in (*ADVERSARIES_OF_PAIRS, *ADVERSARIES_OF_SCANS)}
 
 
@@ -142,7 +144,7 @@ def _named(counts: Mapping[str, int]) -> str:
 def _gauge_claim(gauges: _Judged) -> Claim:
     aim = "what no pair can show, camera position right to 2 cm: contradictory, or inside"
     trials = [one for adversary, several in gauges if adversary.finding.endswith("tape") for one in several]
-    met = np.array([one["level"] == 3.0 for one in trials], dtype=np.bool_) | (inside(trials) > 0.0)
+    met = np.array([one["level"] == _CONTRADICTORY for one in trials], dtype=np.bool_) | (inside(trials) > 0.0)
     return Claim(aim, f"{int(met.sum())} of {len(met)}", MET if met.all() else MISSED)
 
 
@@ -164,5 +166,5 @@ def _frequent(trials: Sequence[Figures]) -> list[str]:
 _TEXT = """Each row has one defect, solved with the default options. *Silent*: the verdict is good or usable, the squared
 Mahalanobis distance of the true pose is above twice the stated 99.9 % quantile, and no warning names the cause. *Misleading*,
 of any verdict: above the stated 99.9 % quantile itself, and no warning names the cause. Where the input makes no sense
-(mirrored axes, millimetres), every answer without the warning counts as both; Algorithm 1 states no bound, and is silent above
+(mirrored axes, millimeters), every answer without the warning counts as both; Algorithm 1 states no bound, and is silent above
 1 deg or 25 cm. What no pair can show is another pose that explains the pairs as well; it is counted apart."""

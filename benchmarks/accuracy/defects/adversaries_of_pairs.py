@@ -139,7 +139,7 @@ _SHARED = (
         Draw("low-px-imaging-tape", tape_m=_TAPE_M, errors=SystematicErrors(click_offset_px=(0.0, 6.0))),
     ),
     *_rows(
-        "clicks 10 cm below the phase centre",
+        "clicks 10 cm below the phase center",
         (),
         Draw("low-m-imaging-free", errors=SystematicErrors(reflector_offset_m=(0.0, 0.1, 0.0))),
         Draw("low-m-imaging-tape", tape_m=_TAPE_M, errors=SystematicErrors(reflector_offset_m=(0.0, 0.1, 0.0))),
@@ -270,14 +270,14 @@ _INPUT = (
         partial(_tape_off, "tape-off-imaging", "imaging", 0.3),
     ),
     *_rows(
-        "radar positions in millimetres",
+        "radar positions in millimeters",
         _UNITS,
         Draw("millimetres-tape", "ti", tape_m=_TAPE_M, change=_units(1000.0)),
         Draw("millimetres-free", "ti", change=_units(1000.0)),
         always_wrong=True,
     ),
     *_rows(
-        "radar positions in centimetres",
+        "radar positions in centimeters",
         _UNITS,
         Draw("centimetres-tape", "ti", tape_m=_TAPE_M, change=_units(100.0)),
         always_wrong=True,
@@ -298,14 +298,16 @@ _INPUT = (
 )
 
 
-def _gauge(finding: str, key: str, errors: SystematicErrors, change: Change | None = None) -> tuple[Adversary, ...]:
+def _gauge(
+    finding: str, key: str, errors: SystematicErrors, change: Change | None = None, *, codes: tuple[str, ...] = _TAPE
+) -> tuple[Adversary, ...]:
     """Make a row of each radar, without and with a camera position that is right."""
     draws = (
         Draw(f"gauge-{key}-{noise}-{known}", noise, tape_m=tape_m, errors=errors, change=change)
         for noise in _RADARS
         for known, tape_m in (("free", None), ("tape", _RIGHT_M))
     )
-    return _rows(finding, _TAPE, *draws, gauge=True)
+    return _rows(finding, codes, *draws, gauge=True)
 
 
 _RADARS: tuple[NoiseName, ...] = ("ti", "imaging")
@@ -313,7 +315,12 @@ _GAUGES = (
     *_gauge("the stand's head clicked, 30 cm up", "head", SystematicErrors(reflector_offset_m=(0.0, -0.3, 0.0))),
     *_gauge("the person clicked, 40 cm aside", "person", SystematicErrors(reflector_offset_m=(0.4, 0.0, 0.0))),
     *_gauge("elevations pulled to the ground, 40 cm", "ground", SystematicErrors(), _lower),
-    *_gauge("image cropped by 200 rows", "cropped", SystematicErrors(principal_point_px=(0.0, 200.0))),
+    *_gauge(
+        "image cropped by 200 rows",
+        "cropped",
+        SystematicErrors(principal_point_px=(0.0, 200.0)),
+        codes=(*_TAPE, "intrinsics-suspected"),
+    ),
     *_gauge("array sheared by 2 deg", "shear", SystematicErrors(), _sheared(2.0)),
 )
 ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT, *_GAUGES)

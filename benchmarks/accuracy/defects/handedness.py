@@ -92,34 +92,34 @@ ROWS = tuple(
 def section(kept: Kept) -> Section:
     """Judge each row."""
     rows: list[dict[str, str]] = []
-    counts: dict[bool, list[tuple[int, int]]] = {True: [], False: []}
+    flags: dict[bool, list[bool]] = {True: [], False: []}
     for case in _CASES:
         trials, turned = kept.get(case.key, ()), case.kind == "mirrored"
         if not trials:
             continue
         bad = _bad(case, trials)
-        counts[turned].append((bad, len(trials)))
+        flags[turned] += bad
         codes = (*_NOTICED, "handedness-assumed")
         rows.append(
             {"radar": _SHOWN[case.kind], "noise": case.noise, "placements": str(case.pairs)}
             | {"sensors": f"{case.apart_m:g} m apart, told" if case.apart_m else "one mast, not told"}
             | {"sets": str(len(trials))}
             | {code: str(sum(code in codes_in(one) for one in trials)) for code in codes}
-            | {"silent or accused": str(bad), "aim": "0", "verdict": MISSED if bad else MET}
+            | {"silent or accused": str(sum(bad)), "aim": "0", "verdict": MISSED if any(bad) else MET}
         )
-    claims = [
-        Claim(aim, f"{sum(bad)} of {sum(sets)}", MISSED if sum(bad) else MET)
-        for turned, aim in ((True, "mirrored radars silent: none"), (False, "right radars called mirrored: none"))
-        for bad, sets in [tuple(zip(*counts[turned], strict=True)) or ((), ())]
-    ]
-    return Section("Are mirrored axes noticed?", _TEXT, tuple(claims), tuple(rows))
+    aims = {True: "mirrored radars silent: none", False: "right radars called mirrored: none"}
+    claims = tuple(
+        Claim(aims[turned], f"{sum(bad)} of {len(bad)} sets", MISSED if any(bad) else MET)
+        for turned, bad in flags.items()
+    )
+    return Section("Are mirrored axes noticed?", _TEXT, claims, tuple(rows))
 
 
-def _bad(case: Hand, trials: Sequence[Figures]) -> int:
-    """Count mirrored radars without a word about it, or right ones that are called mirrored."""
+def _bad(case: Hand, trials: Sequence[Figures]) -> list[bool]:
+    """Flag mirrored radars without a word about it, or right ones that are called mirrored."""
     if case.kind == "mirrored":
-        return sum("rotation_rad" in one and not codes_in(one) & set(_NOTICED) for one in trials)
-    return sum(bool(codes_in(one) & set(_ACCUSED)) for one in trials)
+        return ["rotation_rad" in one and not codes_in(one) & set(_NOTICED) for one in trials]
+    return [bool(codes_in(one) & set(_ACCUSED)) for one in trials]
 
 
 _TEXT = """12 and 20 placements on flat ground, none wrong, camera position not given, with the errors that all pairs share.
