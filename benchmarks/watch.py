@@ -21,8 +21,8 @@ from calib_core.radar import RadarErrors
 from calib_core.synthetic.annotations import true_boxes
 from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.recording import SimulatedRecording, simulate
-from calib_core.watching.traffic import TrafficModel, TrafficRows, learned
-from calib_core.watching.watching import Watched, stretches
+from calib_core.watching.traffic import TrafficModel, TrafficRows, Watched, learned
+from calib_core.watching.watching import stretches
 
 __all__ = ["main"]
 

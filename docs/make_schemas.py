@@ -24,7 +24,7 @@ from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, Prop
 from calib_core.interchange.syntax.strict_json import is_setting, json_text
 from calib_core.json_forms import form_of
 from calib_core.measurements import Stamp
-from calib_core.watching.baseline import BASELINE_SCHEMA, BaselineDocument
+from calib_core.watching.baseline import BASELINE_SCHEMA, Baseline
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome
 from cocalib.batch.results_table import RESULTS_SCHEMA, BatchResults
 
@@ -39,13 +39,14 @@ _DOCUMENTS: dict[str, Any] = {
     BOARD_VIEWS_SCHEMA: BoardViewsDocument,
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
-    BASELINE_SCHEMA: BaselineDocument,
+    BASELINE_SCHEMA: Baseline,
     OUTCOME_SCHEMA: Outcome,
     RESULTS_SCHEMA: BatchResults,
 }
 
 _NAMES = {
     "AssumptionNote": "AssumptionDocument",
+    "Baseline": "BaselineDocument",
     "Board": "BoardDocument",
     "ChosenReturn": "ReturnDocument",
     "WarningText": "WarningDocument",
@@ -56,7 +57,9 @@ _NAMES = {
     "ImageSource": "SourceDocument",
     "RadarErrors": "RadarErrorsDocument",
     "Stamp": "TimeDocument",
+    "StillPlaces": "StillPlacesDocument",
     "SystematicErrorResult": "SystematicErrorDocument",
+    "TrafficModel": "TrafficDocument",
     "UnpairedText": "UnpairedDocument",
     "UnconfirmedClicks": "UnconfirmedDocument",
     "VehicleNote": "VehicleDocument",

@@ -106,7 +106,7 @@ def baseline_lines(baseline: Baseline) -> Iterator[str]:
     seconds = (baseline.end - baseline.start) / NS_PER_S
     traffic = baseline.traffic
     parts = [f"{len(baseline.backgrounds)} still images"] if baseline.backgrounds else []
-    parts += [f"{len(baseline.places)} still returns"] if baseline.places is not None else []
+    parts += [f"{len(baseline.still_returns)} still returns"] if baseline.still_returns is not None else []
     parts += [f"{sum(traffic.passages)} passages ({', '.join(traffic.labels)})"] if traffic is not None else []
     yield f"baseline: {baseline.recording}, {seconds:.0f} s: {', '.join(parts)}"
     if traffic is not None and traffic.seconds < LEAST_TRAFFIC_S:

@@ -7,14 +7,14 @@ of the image: corners of one tile share what light and shadow do to them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Vector3, freeze
+from calib_core.arrays import Matrix33, Vector3
 from calib_core.boxes.moving import background_of, reduced
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp, rotation_log
+from calib_core.watching.witnesses import Turn
 
 BACKGROUND_FRAMES = 25
 LEAST_SHARE = 0.3
@@ -32,26 +32,6 @@ _FEWEST_TILES = 6
 _ROUNDS = 4
 _FLOOR_RAD = np.deg2rad(0.005)
 _AHEAD = 0.1  # least z of a ray of unit length that a homography can hold
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Turn:
-    """A rotation between two times, as small angles about x, y and z of a sensor's own axes.
-
-    Attributes:
-        rotation_rad: (3,) of what the sensor sees; a point p moves to Exp(rotation) p.
-        covariance_rad2: (3, 3).
-        share: of the tiles or places that moved alike.
-        determined: whether it is, about each axis: a radar without elevation sees turns about its vertical only.
-    """
-
-    rotation_rad: Vector3
-    covariance_rad2: Matrix33
-    share: float = 1.0
-    determined: tuple[bool, bool, bool] = (True, True, True)
-
-    def __post_init__(self) -> None:
-        freeze(self, rotation_rad=(3,), covariance_rad2=(3, 3))
 
 
 def background(images: Sequence[np.ndarray]) -> np.ndarray | None:
@@ -108,7 +88,7 @@ def camera_turn(before: np.ndarray, after: np.ndarray, camera: Camera) -> Turn |
         rotation, covariance = _rotation(start[alike], end[alike], np.unique(tiles[alike], return_inverse=True)[1])
         alike = np.linalg.norm(end - start @ rotation_exp(rotation).T, axis=1) < alike_rad
     share = len(np.unique(tiles[alike])) / len(np.unique(tiles))
-    return Turn(rotation, covariance, share) if share >= LEAST_SHARE else None
+    return Turn(rotation, covariance) if share >= LEAST_SHARE else None
 
 
 def _pixels_per_rad(camera: Camera, width_px: int) -> float:

@@ -5,15 +5,19 @@ spread of their returns. In other scans, the median of the returns near each pla
 all places together give a rotation of the radar, about the vertical alone where it measures no elevation.
 """
 
-from dataclasses import dataclass
+from typing import Annotated
 
+import msgspec
 import numpy as np
+from msgspec import Meta, Struct
 
-from calib_core.arrays import Indices, Points3, Values, freeze
+from calib_core.arrays import Indices, Points3, Values
 from calib_core.measurements import RadarScans
 from calib_core.radar import polar_from_cartesian
-from calib_core.watching.still_image import Turn
+from calib_core.watching.witnesses import Turn
 
+Finite = Annotated[float, Meta(ge=-1e12, le=1e15)]
+"""A number of a baseline."""
 _STILL_MPS = 0.3
 _MOST_SCANS = 600
 _MOST_PLACES = 80
@@ -28,20 +32,20 @@ _FLOOR_RAD = np.deg2rad(0.03)
 _UNKNOWN_RAD = np.deg2rad(20.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StillPlaces:
-    """Places that the radar sees again and again, the most persistent first.
+class StillPlaces(Struct, frozen=True, forbid_unknown_fields=True):
+    """Places that return again and again: range [m], azimuth and elevation [rad], and the spreads of the two angles [rad].
 
     Attributes:
-        polar: (n, 3) median range [m], azimuth and elevation [rad].
-        spreads_rad: (n, 2) robust standard deviation of the returns' azimuth and elevation.
+        polar: (n, 3) medians, the most persistent place first.
+        spreads_rad: (n, 2) robust standard deviations.
     """
 
-    polar: Points3
-    spreads_rad: np.ndarray
+    polar: Annotated[list[tuple[Finite, Finite, Finite]], Meta(max_length=1000)]
+    spreads_rad: Annotated[list[tuple[Finite, Finite]], Meta(max_length=1000)]
 
     def __post_init__(self) -> None:
-        freeze(self, polar=(None, 3), spreads_rad=(len(self.polar), 2))
+        if len(self.spreads_rad) != len(self.polar):
+            raise ValueError("each place needs its spreads; write the baseline again from its recording")
 
     def __len__(self) -> int:
         return len(self.polar)
@@ -71,7 +75,9 @@ def still_places(scans: RadarScans) -> StillPlaces:
         middle = np.median(polar[rows], axis=0)
         places.append(middle[None])
         spreads.append(1.4826 * np.median(np.abs(polar[rows, 1:] - middle[1:]), axis=0)[None])
-    return StillPlaces(np.concatenate(places), np.concatenate(spreads))
+    return msgspec.convert(
+        {"polar": np.concatenate(places).tolist(), "spreads_rad": np.concatenate(spreads).tolist()}, StillPlaces
+    )
 
 
 def radar_turn(places: StillPlaces, scans: RadarScans) -> Turn | None:
@@ -84,18 +90,19 @@ def radar_turn(places: StillPlaces, scans: RadarScans) -> Turn | None:
     polar, _, _ = _still(scans)
     if len(places) < _FEWEST_PLACES or not len(polar):
         return None
-    found = [_moved(places, polar, turn, narrow=True) for turn in _SEARCHED_RAD]
+    known = np.column_stack([places.polar, places.spreads_rad])
+    found = [_moved(known, polar, turn, narrow=True) for turn in _SEARCHED_RAD]
     votes = np.array([counts.sum() for _, counts in found])
     turn = float(
         _SEARCHED_RAD[np.flatnonzero(votes == votes.max())[np.abs(_SEARCHED_RAD[votes == votes.max()]).argmin()]]
     )
     for _ in range(4):
-        moved, counts = _moved(places, polar, turn)
+        moved, counts = _moved(known, polar, turn)
         kept = np.flatnonzero(counts >= _FEWEST_RETURNS)
         if len(kept) < _FEWEST_PLACES:
             return None
         turn = float(np.median(moved[kept, 0]))
-    return _turn(places, moved, kept)
+    return _turn(known[kept], moved[kept])
 
 
 def _still(scans: RadarScans) -> tuple[Points3, Indices, int]:
@@ -108,22 +115,22 @@ def _still(scans: RadarScans) -> tuple[Points3, Indices, int]:
     return polar_from_cartesian(scans.points_radar_m[kept]), of_return[kept] // step, -(-len(scans) // step)
 
 
-def _moved(places: StillPlaces, polar: Points3, turn: float, *, narrow: bool = False) -> tuple[np.ndarray, Values]:
+def _moved(places: np.ndarray, polar: Points3, turn: float, *, narrow: bool = False) -> tuple[np.ndarray, Values]:
     """Return by how much azimuth and elevation of each place have moved (n, 2), and from how many returns (n,).
 
     Args:
-        places: of the baseline.
+        places: (n, 5) of the baseline, with their spreads.
         polar: (m, 3) of still returns, any order.
         turn: near which they are looked for.
         narrow: look near that turn only, as for a vote.
     """
     order = np.argsort(polar[:, 0], kind="stable")
     ranged = polar[order]
-    low, high = (np.searchsorted(ranged[:, 0], places.polar[:, 0] + reach) for reach in (-_REACH_M, _REACH_M))
-    reach = _REACH_RAD / (2.0 if narrow else 1.0) + (0.0 if narrow else _REACH_SIGMAS) * places.spreads_rad[:, 0]
+    low, high = (np.searchsorted(ranged[:, 0], places[:, 0] + reach) for reach in (-_REACH_M, _REACH_M))
+    reach = _REACH_RAD / (2.0 if narrow else 1.0) + (0.0 if narrow else _REACH_SIGMAS) * places[:, 3]
     moved, counts = np.zeros((len(places), 2)), np.zeros(len(places))
     for place in range(len(places)):
-        near = ranged[low[place] : high[place], 1:] - places.polar[place, 1:]
+        near = ranged[low[place] : high[place], 1:] - places[place, 1:3]
         near = near[np.abs(near[:, 0] - turn) < reach[place]]
         counts[place] = len(near)
         if len(near) and not narrow:
@@ -131,15 +138,15 @@ def _moved(places: StillPlaces, polar: Points3, turn: float, *, narrow: bool = F
     return moved, counts
 
 
-def _turn(places: StillPlaces, moved: np.ndarray, kept: Indices) -> Turn:
+def _turn(places: np.ndarray, moved: np.ndarray) -> Turn:
     """Fit a rotation of the radar to how far its places have moved; what scatters between places is the noise."""
-    azimuth, elevation = places.polar[kept, 1], places.polar[kept, 2]
-    none = np.zeros(len(kept))
-    flat = bool(np.median(places.spreads_rad[kept, 1]) < _LEAST_SPREAD_RAD)
+    azimuth, elevation = places[:, 1], places[:, 2]
+    none = np.zeros(len(places))
+    flat = bool(np.median(places[:, 4]) < _LEAST_SPREAD_RAD)
     slope = np.tan(elevation)
-    by_azimuth = np.stack([-slope * np.cos(azimuth), -slope * np.sin(azimuth), np.ones(len(kept))], axis=1)
+    by_azimuth = np.stack([-slope * np.cos(azimuth), -slope * np.sin(azimuth), 1.0 + none], axis=1)
     by_elevation = np.stack([np.sin(azimuth), -np.cos(azimuth), none], axis=1)
-    design, values = ([by_azimuth], [moved[kept, 0]]) if flat else ([by_azimuth, by_elevation], [*moved[kept].T])
+    design, values = ([by_azimuth], [moved[:, 0]]) if flat else ([by_azimuth, by_elevation], [*moved.T])
     information, gradient = np.eye(3) / _UNKNOWN_RAD**2, np.zeros(3)
     for rows, value in zip(design, values, strict=True):
         off = value - np.median(value)
@@ -148,9 +155,5 @@ def _turn(places: StillPlaces, moved: np.ndarray, kept: Indices) -> Turn:
         information += rows.T @ (weight[:, None] * rows)
         gradient += rows.T @ (weight * value)
     covariance = np.linalg.inv(information)
-    return Turn(
-        covariance @ gradient,
-        covariance + _FLOOR_RAD**2 * np.eye(3),
-        len(kept) / len(places),
-        (not flat, not flat, True),
-    )
+    determined = (not flat, not flat, True)
+    return Turn(covariance @ gradient, covariance + _FLOOR_RAD**2 * np.eye(3), determined=determined)

@@ -9,10 +9,12 @@ change.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
-from calib_core.arrays import Flags, Indices, Matrix33, Points3, TimesNs, Values, Vector3, freeze
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, freeze
 from calib_core.camera import Camera
 from calib_core.evaluation.counted_returns import (
     Bearings,
@@ -25,8 +27,11 @@ from calib_core.evaluation.counted_returns import (
 )
 from calib_core.evaluation.target_tracking import find_targets
 from calib_core.geometry import RigidTransform
+from calib_core.json_forms import Count
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import RadarErrors
+from calib_core.watching.still_returns import Finite
+from calib_core.watching.witnesses import Turn
 
 BEARING, ELEVATION = 0, 1
 
@@ -41,6 +46,21 @@ _FEWEST = 2
 _PASSAGE_NS = 20 * NS_PER_S
 """The longest passage: where on a body the radar sees it changes as it turns, so an object that stays passes again."""
 _MOST_PASSAGES = 1 << 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watched:
+    """What is watched: a calibration's pose, lens and corrections.
+
+    Attributes:
+        camera_from_radar: the pose.
+        camera: the lens.
+        radar_errors: that the calibration takes out of the returns.
+    """
+
+    camera_from_radar: RigidTransform
+    camera: Camera
+    radar_errors: RadarErrors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,43 +116,14 @@ class _Frames:
     whole: Flags
 
 
-def traffic_rows(
-    camera_from_radar: RigidTransform,
-    camera: Camera,
-    sightings: Sightings,
-    matches: Matches,
-    table: BoxTable,
-    scan_times_ns: TimesNs,
-    *,
-    radar_errors: RadarErrors,
-) -> TrafficRows:
-    """Average what matched targets and boxes say over seconds.
-
-    Args:
-        camera_from_radar: the calibration that is watched.
-        camera: the lens.
-        sightings: of targets in the annotated frames.
-        matches: the box of each.
-        table: the boxes.
-        scan_times_ns: (f,) stamp of the scan of each annotated frame.
-        radar_errors: that the calibration takes out.
-    """
-    return _seconds(_frames(camera_from_radar, camera, sightings, matches, table, scan_times_ns, radar_errors))
-
-
 def _frames(
-    camera_from_radar: RigidTransform,
-    camera: Camera,
-    sightings: Sightings,
-    matches: Matches,
-    table: BoxTable,
-    scan_times_ns: TimesNs,
-    radar_errors: RadarErrors,
+    watched: Watched, sightings: Sightings, matches: Matches, table: BoxTable, scan_times_ns: TimesNs
 ) -> _Frames:
+    """Return the boxes with a target: its sightings, and the stamp of the scan of each annotated frame (f,)."""
     of_box = matches.boxes[sightings.of_return]
     matched = np.flatnonzero(of_box >= 0)
-    points = camera_from_radar @ radar_errors.corrected(sightings.points_radar_m[matched])
-    ahead = points[:, 2] > 1.0
+    points = watched.camera_from_radar @ watched.radar_errors.corrected(sightings.points_radar_m[matched])
+    camera, ahead = watched.camera, points[:, 2] > 1.0
     matched, points = matched[ahead], points[ahead]
     boxes, own = np.unique(of_box[matched], return_inverse=True)
     centres, angles = _seen(points, sightings.snr_db[matched], own, len(boxes))
@@ -277,54 +268,56 @@ def starting_variances(rows: TrafficRows) -> tuple[Values, Values]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TurnFromTraffic:
-    """What the traffic of some seconds says of a turn since the baseline.
+class TurnFromTraffic(Turn):
+    """What the traffic of some seconds says of a turn of the camera against the radar since the baseline.
 
     Attributes:
-        rotation_rad: (3,) of the camera against the radar: camera_from_radar is now Exp(rotation) times what it was.
-        covariance_rad2: (3, 3).
         passages: that say it.
         least_z: (3,) smallest turn over its standard deviation about each axis, without whichever single passage; 0 if that
             changes the sign, or if there are fewer than three.
         worst_sigma_rad: (3,) largest standard deviation without whichever single passage; infinite if there are fewer than three.
     """
 
-    rotation_rad: Vector3
-    covariance_rad2: Matrix33
     passages: int
     least_z: Vector3
     worst_sigma_rad: Vector3
 
     def __post_init__(self) -> None:
-        freeze(self, rotation_rad=(3,), covariance_rad2=(3, 3), least_z=(3,), worst_sigma_rad=(3,))
+        Turn.__post_init__(self)
+        freeze(self, least_z=(3,), worst_sigma_rad=(3,))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TrafficModel:
-    """What a baseline teaches of traffic.
+class TrafficModel(Struct, frozen=True, forbid_unknown_fields=True):
+    """How boxes and returns differ in traffic, by class; the unknowns are turn, clock, and the body height of each class.
 
     Attributes:
         labels: the classes (m).
         factors: (m, 2, 2) of the starting variances, by class and direction: of a second, of a passage.
-        middle: (4 + m,) what its own rows say: turn, clock, body height of each class.
+        middle: (4 + m,) what its own rows say.
         information: (4 + m, 4 + m) of its rows.
         gradient: (4 + m,).
         passages: number of passages of each class (m).
         seconds: of traffic.
     """
 
-    labels: tuple[str, ...]
-    factors: np.ndarray
-    middle: Values
-    information: np.ndarray
-    gradient: Values
-    passages: tuple[int, ...]
-    seconds: float
+    labels: Annotated[list[Annotated[str, Meta(max_length=200)]], Meta(max_length=200)]
+    factors: list[list[list[Finite]]]
+    middle: list[Finite]
+    information: list[list[Finite]]
+    gradient: list[Finite]
+    passages: list[Count]
+    seconds: Annotated[float, Meta(ge=0.0, le=1e9)]
 
     def __post_init__(self) -> None:
         count = len(self.labels)
         size = _OWN + count
-        freeze(self, factors=(count, 2, 2), middle=(size,), information=(size, size), gradient=(size,))
+        parts = (self.factors, self.middle, self.information, self.gradient, self.passages)
+        shapes = [(count, 2, 2) if count else (0,), (size,), (size, size), (size,), (count,)]
+        if [np.shape(part) for part in parts] != shapes or len(set(self.labels)) != count:
+            raise ValueError("its parts must be of one size, and each label there once; write the baseline again")
+        least = np.linalg.eigvalsh(self.information).min()
+        if np.min(self.factors, initial=1.0) <= 0.0 or least < -1e-6 * abs(np.trace(self.information)):
+            raise ValueError("factors and information must be positive; write the baseline again from its recording")
 
     def turn(self, rows: TrafficRows) -> TurnFromTraffic | None:
         """Return what rows say of a turn since the baseline; None if there are no rows that fit."""
@@ -333,7 +326,7 @@ class TrafficModel:
         size = _OWN + len(labels)
         known = np.zeros(size)
         known[: len(self.middle)] = self.middle
-        second, passage = self._variances(rows, classes)
+        second, passage = _variances(np.array(self.factors).reshape(-1, 2, 2), rows, classes)
         own = _design(rows, classes, len(labels))
         misfit = np.abs(rows.residuals_rad - own @ known) / np.sqrt(second + passage + _MISFIT_RAD**2)
         kept = np.flatnonzero(misfit < _MISFIT)
@@ -360,14 +353,15 @@ class TrafficModel:
             worst = sigmas.max(axis=0)
         return TurnFromTraffic(rotation, covariance, len(names), least, worst)
 
-    def _variances(self, rows: TrafficRows, classes: Indices) -> tuple[Values, Values]:
-        """Return the variances of a second and of a passage (n,), those of an unknown class well above all others."""
-        widest = self.factors.max(axis=0, initial=1.0)
-        unknown = np.broadcast_to(_UNKNOWN_CLASS * widest, (int(classes.max(initial=-1)) + 1, 2, 2))
-        factors = np.concatenate([self.factors, unknown[len(self.factors) :]])
-        second, passage = starting_variances(rows)
-        own = factors[classes, rows.directions] if len(rows) else np.zeros((0, 2))
-        return second * own[:, 0], passage * own[:, 1]
+
+def _variances(factors: np.ndarray, rows: TrafficRows, classes: Indices) -> tuple[Values, Values]:
+    """Return the variances of a second and of a passage (n,), those of an unknown class well above all others."""
+    widest = factors.max(axis=0, initial=1.0)
+    unknown = np.broadcast_to(_UNKNOWN_CLASS * widest, (int(classes.max(initial=-1)) + 1, 2, 2))
+    factors = np.concatenate([factors, unknown[len(factors) :]])
+    second, passage = starting_variances(rows)
+    own = factors[classes, rows.directions] if len(rows) else np.zeros((0, 2))
+    return second * own[:, 0], passage * own[:, 1]
 
 
 _FEWEST_PASSAGES = 3
@@ -375,17 +369,16 @@ _FEWEST_PASSAGES = 3
 
 def learned(rows: TrafficRows) -> TrafficModel:
     """Learn from a baseline's rows: variances by class and direction about its own fit, and what that fit is."""
-    labels = tuple(sorted(set(rows.labels.tolist())))
+    labels = sorted(set(rows.labels.tolist()))
     classes = _classes(rows, labels)
     design = _design(rows, classes, len(labels))
     prior = _prior(len(labels), change=False)
     base = starting_variances(rows)
     factors = np.ones((len(labels), 2, 2))
-    passages = tuple(len(np.unique(rows.passages[classes == one])) for one in range(len(labels)))
+    passages = [len(np.unique(rows.passages[classes == one])) for one in range(len(labels))]
     span_s = float(np.ptp(rows.times_ns)) / NS_PER_S if len(rows) else 0.0
     for _ in range(4):
-        model = TrafficModel(labels, factors, np.zeros(len(prior)), prior, np.zeros(len(prior)), passages, span_s)
-        second, passage = model._variances(rows, classes)
+        second, passage = _variances(factors, rows, classes)
         blocks, gradients = _by_passage(rows, design, second, passage)[1:]
         information, gradient = blocks.sum(axis=0), gradients.sum(axis=0)
         middle = np.linalg.solve(information + prior, gradient)
@@ -396,7 +389,8 @@ def learned(rows: TrafficRows) -> TrafficModel:
              for way in (BEARING, ELEVATION)]
             for one in range(len(labels))
         ]).reshape(-1, 2, 2)  # fmt: skip
-    return TrafficModel(labels, factors, middle, information, gradient, passages, span_s)
+    statistics = (factors.tolist(), middle.tolist(), information.tolist(), gradient.tolist())
+    return TrafficModel(labels, *statistics, passages, span_s)
 
 
 def _factors(rows: TrafficRows, residuals: Values, base: tuple[Values, Values], own: Indices) -> tuple[float, float]:
@@ -459,31 +453,26 @@ def _by_passage(
 
 
 def rows_of_stretch(
-    camera_from_radar: RigidTransform,
-    camera: Camera,
+    watched: Watched,
     scans: RadarScans,
     table: BoxTable,
     *,
     span_ns: tuple[int, int],
-    radar_errors: RadarErrors,
     start: Bearings | None = None,
 ) -> tuple[TrafficRows, Bearings | None]:
     """Follow the targets of a stretch, match them to boxes and average; also return how the sensors saw the same target.
 
     Args:
-        camera_from_radar: the calibration that is watched.
-        camera: the lens.
+        watched: the calibration.
         scans: of the stretch, and of some seconds before and after it.
         table: the boxes; those of the frames in the stretch count.
         span_ns: first stamp of the stretch, and that of the next one.
-        radar_errors: that the calibration takes out.
         start: how the sensors saw the same target in the stretch before.
     """
     tracks = find_targets([scans]).tracks
     scans_of_frames = frame_scans(table.times_ns, scans.times_ns)
     within = (table.times_ns >= span_ns[0]) & (table.times_ns < span_ns[1])
     sightings = tracked_sightings(tracks, np.where(within, scans_of_frames, -1))
-    matches = match_by_bearing(sightings, table, camera, start=start)
+    matches = match_by_bearing(sightings, table, watched.camera, start=start)
     scan_times = scans.times_ns[np.maximum(scans_of_frames, 0)] if len(scans) else table.times_ns
-    rows = traffic_rows(camera_from_radar, camera, sightings, matches, table, scan_times, radar_errors=radar_errors)
-    return rows, matches.bearings or start
+    return _seconds(_frames(watched, sightings, matches, table, scan_times)), matches.bearings or start

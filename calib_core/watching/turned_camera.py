@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, DataWarning, ReflectorClick, TimeNs
-from calib_core.watching.still_image import Turn
+from calib_core.watching.witnesses import Turn
 
 FEW_IMAGES, MOST_IMAGES = 5, 16
 """That are looked at first, and to say when if these show a turn."""

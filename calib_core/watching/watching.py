@@ -12,14 +12,12 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError, MessageError, NoAnswerError
 from calib_core.evaluation.counted_returns import Bearings, BoxTable, box_table
 from calib_core.evaluation.moving_returns import TargetOptions, moving_returns
-from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Boxes, RadarScans, TimeNs
-from calib_core.radar import RadarErrors
-from calib_core.watching.baseline import Baseline
-from calib_core.watching.still_image import BACKGROUND_FRAMES, Turn, background, camera_turn
+from calib_core.watching.baseline import BASELINE_SCHEMA, Baseline, encoded
+from calib_core.watching.still_image import BACKGROUND_FRAMES, background, camera_turn
 from calib_core.watching.still_returns import radar_turn, still_places
-from calib_core.watching.traffic import TrafficModel, TrafficRows, learned, rows_of_stretch
-from calib_core.watching.witnesses import SeenTurn, Verdict, verdict_of
+from calib_core.watching.traffic import TrafficModel, TrafficRows, Watched, learned, rows_of_stretch
+from calib_core.watching.witnesses import SeenTurn, Turn, Verdict, verdict_of
 
 _STRETCH_NS = 30 * NS_PER_S
 _SHORTEST_NS = 5 * NS_PER_S
@@ -63,21 +61,6 @@ class WatchedRecording(Protocol):
 
     def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
         """Decode scans."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Watched:
-    """What is watched: a calibration's pose, lens and corrections.
-
-    Attributes:
-        camera_from_radar: the pose.
-        camera: the lens.
-        radar_errors: that the calibration takes out of the returns.
-    """
-
-    camera_from_radar: RigidTransform
-    camera: Camera
-    radar_errors: RadarErrors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,15 +124,7 @@ def stretches(
             tracks += 0 if own is None else int(own.tracks.max(initial=-1)) + 1
         rows = None
         if own is not None and len(own.labels):
-            rows, bearings = rows_of_stretch(
-                watched.camera_from_radar,
-                watched.camera,
-                scans,
-                own,
-                span_ns=(start, end),
-                radar_errors=watched.radar_errors,
-                start=bearings,
-            )
+            rows, bearings = rows_of_stretch(watched, scans, own, span_ns=(start, end), start=bearings)
         image = background(_frames(recording, frames)) if still else None
         yield Stretch(TimeNs(start), TimeNs(end), image, scans.between(TimeNs(start), TimeNs(end - 1)), rows, still)
         start = end
@@ -159,15 +134,9 @@ def _between(table: BoxTable, start: int, end: int) -> BoxTable:
     """Return the boxes of some frames; their tracks stay those of the recording."""
     first, last = np.searchsorted(table.times_ns, [start - _AROUND_NS, end + _AROUND_NS])
     rows = slice(*np.searchsorted(table.frames, [first, last]))
-    return BoxTable(
-        table.times_ns[first:last],
-        table.frames[rows] - first,
-        table.boxes_px[rows],
-        table.labels[rows],
-        table.tracks[rows],
-        table.names[rows],
-        table.cuboids[rows],
-    )
+    times_ns, frames = table.times_ns[first:last], table.frames[rows] - first
+    sides, tracks, cuboids = table.boxes_px[rows], table.tracks[rows], table.cuboids[rows]
+    return BoxTable(times_ns, frames, sides, table.labels[rows], tracks, table.names[rows], cuboids)
 
 
 def _moving_table(recording: WatchedRecording, frames: np.ndarray, tracks: int) -> BoxTable | None:
@@ -220,12 +189,13 @@ def baseline_of(found: Sequence[Stretch], *, calibration_sha256: str, recording:
             "least half a minute, and give --boxes"
         )
     return Baseline(
+        BASELINE_SCHEMA,
         calibration_sha256,
-        recording,
+        recording[:200] or "recording",
         found[0].start,
         found[-1].end,
         (camera.width_px, camera.height_px),
-        tuple(backgrounds),
+        [encoded(image) for image in backgrounds],
         places if places else None,
         learned(TrafficRows.joined(rows)) if rows else None,
     )
@@ -242,6 +212,7 @@ class Watch:
     def __init__(self, baseline: Baseline, watched: Watched) -> None:
         self._baseline = baseline
         self._watched = watched
+        self._backgrounds = baseline.images()
         self._image = _Turns(_IMAGE_SIGMAS, _IMAGE_RAD)
         self._returns = _Turns(_RETURNS_SIGMAS, _RETURNS_RAD)
         self._rows: TrafficRows | None = None
@@ -251,8 +222,8 @@ class Watch:
         """Take a stretch; return what all so far say."""
         if stretch.image is not None:
             self._image.add(stretch.start, self._image_turn(stretch.image))
-        if stretch.still and self._baseline.places is not None:
-            self._returns.add(stretch.start, radar_turn(self._baseline.places, stretch.scans))
+        if stretch.still and self._baseline.still_returns is not None:
+            self._returns.add(stretch.start, radar_turn(self._baseline.still_returns, stretch.scans))
         if stretch.rows is not None and self._baseline.traffic is not None:
             self._take(stretch.rows, self._baseline.traffic, stretch)
         return verdict_of(
@@ -264,8 +235,7 @@ class Watch:
 
     def _image_turn(self, image: np.ndarray) -> Turn | None:
         """Return the turn since that background of the baseline that says it best."""
-        backgrounds = [one for one in self._baseline.backgrounds if one.shape == image.shape]
-        found = [camera_turn(one, image, self._watched.camera) for one in backgrounds]
+        found = [camera_turn(one, image, self._watched.camera) for one in self._backgrounds]
         return min(
             (one for one in found if one is not None),
             key=lambda one: float(np.trace(one.covariance_rad2)),

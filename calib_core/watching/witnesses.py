@@ -4,7 +4,7 @@ The still image says how the camera turned in the world, the still returns how t
 against each other. A turn is about x, y and z of the camera (pitch, yaw, roll), and about those of the radar for its own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
@@ -30,12 +30,28 @@ _RELATIVE_SIGMAS, _RELATIVE_RAD = 5.0, np.deg2rad(0.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenTurn:
-    """What a witness says.
+class Turn:
+    """A rotation between two times, as small angles about x, y and z of a sensor's own axes.
 
     Attributes:
-        rotation_rad: (3,) since the baseline, as what the sensor sees moves.
+        rotation_rad: (3,) of what the sensor sees; a point p moves to Exp(rotation) p.
         covariance_rad2: (3, 3).
+        determined: whether it is, about each axis: a radar without elevation sees turns about its vertical only.
+    """
+
+    rotation_rad: Vector3
+    covariance_rad2: Matrix33
+    determined: tuple[bool, bool, bool] = field(default=(True, True, True), kw_only=True)
+
+    def __post_init__(self) -> None:
+        freeze(self, rotation_rad=(3,), covariance_rad2=(3, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenTurn(Turn):
+    """What a witness says of a turn since the baseline.
+
+    Attributes:
         least_rad: (3,) smallest turn about each axis that counts; infinite about an axis that is not determined.
         turned: (3,) whether one is seen.
         since: the beginning of the first stretch or window that shows it; None if nothing turned.
@@ -43,8 +59,6 @@ class SeenTurn:
         passages: of traffic that it rests on; 0 for other witnesses.
     """
 
-    rotation_rad: Vector3
-    covariance_rad2: Matrix33
     least_rad: Vector3
     turned: np.ndarray
     since: TimeNs | None = None
@@ -52,7 +66,8 @@ class SeenTurn:
     passages: int = 0
 
     def __post_init__(self) -> None:
-        freeze(self, rotation_rad=(3,), covariance_rad2=(3, 3), least_rad=(3,))
+        Turn.__post_init__(self)
+        freeze(self, least_rad=(3,))
         freeze(self, np.bool_, turned=(3,))
 
     @property

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from calib_core.interchange.format import ImportedCalibration
     from calib_core.recordings import Recording
     from calib_core.watching.baseline import Baseline
-    from calib_core.watching.watching import Stretch, Watched
+    from calib_core.watching.traffic import Watched
+    from calib_core.watching.watching import Stretch
     from calib_core.watching.witnesses import Verdict
 
 _MOST_BASELINE_BYTES = 16 * 1024 * 1024
@@ -55,7 +56,7 @@ class Watch:
 
     def run(self) -> int:
         """Print what has changed; return the exit code."""
-        from calib_core.watching.watching import Watched
+        from calib_core.watching.traffic import Watched
         from cocalib.evaluation.recording_check import judged_calibration
 
         if not self.recording:

@@ -39,8 +39,9 @@ from calib_core.recordings.radar.returns_origin import mount_numbers
 from calib_core.recordings.recording import plain_options
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import lost_data, lost_returns
-from calib_core.watching.still_image import Turn, camera_turn, reduced_grey
+from calib_core.watching.still_image import camera_turn, reduced_grey
 from calib_core.watching.turned_camera import FEW_IMAGES, MOST_IMAGES, camera_turned
+from calib_core.watching.witnesses import Turn
 from calib_core.words.warnings import warning_remark
 from cocalib.platform.resources import version
 from cocalib.session.state import Outcome

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
-from calib_core.watching.still_image import Turn
 from calib_core.watching.turned_camera import camera_turned
+from calib_core.watching.witnesses import Turn
 from tests.unit.watching.test_still_image import CAMERA
 
 SIGMA_PX = 2.0  # 0.29 deg of this camera

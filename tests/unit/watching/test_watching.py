@@ -12,7 +12,8 @@ from calib_core.measurements import RadarScans, TimeNs
 from calib_core.radar import RadarErrors
 from calib_core.watching.carrying import carried_forward
 from calib_core.watching.sentences import baseline_lines, json_line, verdict_lines
-from calib_core.watching.watching import Stretch, Watch, Watched, baseline_of, stretches
+from calib_core.watching.traffic import Watched
+from calib_core.watching.watching import Stretch, Watch, baseline_of, stretches
 from calib_core.watching.witnesses import SeenTurn, Verdict
 from tests.street import CAMERA, TRUE_POSE, street
 from tests.unit.watching.test_still_image import CAMERA as SMALL
