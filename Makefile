@@ -8,7 +8,7 @@ PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,association diagnostics estimation interchange results)
 
-.PHONY: help env dev demo docs test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample image clean
+.PHONY: help env dev demo docs dist test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample image clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -42,6 +42,11 @@ demo: env  ## Open the sample recording in the browser.
 
 docs: $(VENV)/.docs  ## Build the documentation as a site in app/cocalib/site, which the page serves under Help: offline and strict.
 	$(BIN)/python docs/make_site.py
+
+dist: dev docs  ## Build wheel and sdist in dist/, and test them in an empty environment with the pins.
+	rm -rf dist
+	$(BIN)/python -m hatchling build -d dist
+	COCALIB_DIST=dist $(BIN)/pytest -q tests/architecture/test_wheel.py
 
 check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/ruff check .

@@ -1,15 +1,20 @@
-"""The wheel can be built, installed into an empty environment and run there."""
+"""The wheel can be built, installed into an empty environment and run there, and what is released with it is whole.
+
+With `COCALIB_DIST=FOLDER` (`make dist`), what lies in that folder is tested, in an environment with the pinned dependencies only.
+"""
 
 import csv
+import email.policy
 import json
 import os
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
 import sys
 import sysconfig
-import urllib.request
+import tarfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +22,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from markdown_it import MarkdownIt
 
 from benchmarks.boards import render_board
+from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 from calib_core.intrinsics.board import Board
 from calib_core.synthetic.boards import waved_poses
 from calib_core.synthetic.rig import typical_camera
@@ -29,42 +36,51 @@ from tests.served_process import ServedProcess
 pytestmark = pytest.mark.slow
 
 
+_DIST = os.environ.get("COCALIB_DIST")
+
+
+def build(project: Path, folder: Path, *options: str) -> None:
+    """Build with the pinned build backend, without network access."""
+    command = [sys.executable, "-m", "hatchling", "build", "-d", str(folder), *options]
+    subprocess.run(command, cwd=project, check=True, capture_output=True, text=True)
+
+
 @pytest.fixture(scope="module")
-def wheel(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel with the pinned build backend, without network access."""
-    folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
-        cwd=project_root,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    (built,) = folder.glob("*.whl")
+def dist(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder with wheel and sdist."""
+    if _DIST:
+        return project_root / _DIST
+    folder = tmp_path_factory.mktemp("dist")
+    build(project_root, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(dist: Path) -> Path:
+    """Return the wheel."""
+    (built,) = dist.glob("*.whl")
     return built
 
 
 @pytest.fixture(scope="module")
-def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install the wheel into an empty environment that uses this one's dependencies; return its folder.
+def installed(wheel: Path, project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into an empty environment; return its folder.
 
-    The locked dependencies are already installed here; a .pth file makes them visible, so that the test needs no
-    network and the checkout is not on the path.
+    Its dependencies are the pinned ones for a release, else those of this environment: a .pth file makes them visible, so that
+    the test needs no network and the checkout is not on the path.
     """
     folder = tmp_path_factory.mktemp("environment")
-    subprocess.run(
-        [sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True
-    )  # the pip of this environment can install into it
+    subprocess.run([sys.executable, "-m", "venv", *([] if _DIST else ["--without-pip"]), str(folder)], check=True)
     python = folder / "bin" / "python"
+    if _DIST:
+        install = ["sh", ".ci/install", "requirements/runtime.txt"]
+        subprocess.run(install, cwd=project_root, check=True, env={**os.environ, "VENV": str(folder)})
+    else:
+        ask = "import sysconfig; print(sysconfig.get_path('purelib'))"
+        site = subprocess.run([python, "-c", ask], check=True, capture_output=True, text=True).stdout.strip()
+        (Path(site) / "zz_borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
     subprocess.run([*pip, "install", "--quiet", "--no-index", "--no-deps", str(wheel)], check=True)
-    site = subprocess.run(
-        [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.strip()
-    (Path(site) / "zz_borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return folder
 
 
@@ -85,19 +101,53 @@ def test_the_wheel_contains_the_page_and_the_sample(wheel):
     assert not any("__pycache__" in name or "/tests/" in name for name in names)
 
 
-def test_the_installed_command_finds_its_own_page_and_sample(installed, tmp_path):
-    code = "from cocalib.platform import resources; print(resources.static_folder()); print(resources.sample_folder())"
-    printed = subprocess.run(
-        [installed / "bin" / "python", "-c", code],
-        cwd=tmp_path,
-        check=True,
-        capture_output=True,
-        text=True,
-        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
-    ).stdout.split()
-    assert len(printed) == 2
-    for line in printed:
-        assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
+def test_the_sdist_builds_the_same_wheel(dist, wheel, tmp_path):
+    (sdist,) = dist.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (source,) = tmp_path.iterdir()
+    assert {path.name for path in source.iterdir()} == {
+        *(
+            "app",
+            "calib_core",
+            "static",
+            "sample_data",
+            "docs",
+            "hatch_build.py",
+            "pyproject.toml",
+            "PKG-INFO",
+            ".gitignore",
+        ),
+        *("LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff"),
+    }
+    build(source, tmp_path / "again", "-t", "wheel")
+    (again,) = (tmp_path / "again").glob("*.whl")
+    sums = [{info.filename: info.CRC for info in zipfile.ZipFile(path).infolist()} for path in (wheel, again)]
+    assert sums[0] == sums[1]
+
+
+def test_the_metadata_describe_the_release(wheel, project_root):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        metadata = email.message_from_bytes(archive.read(name), policy=email.policy.default)
+    version = metadata["Version"]
+    assert (metadata["Name"], metadata["License-Expression"]) == ("cocalib", "Apache-2.0")
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    page = MarkdownIt().enable("table").render(metadata.get_payload())
+    assert re.findall(r"<h[12]>(.*?)</h[12]>", page)[:2] == ["cocalib", "What you need"]
+    assert all(address.startswith("https://") for address in re.findall(r'(?:href|src)="([^"]*)"', page))
+    heading = re.search(r"^## (.*)", (project_root / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert heading is not None
+    assert re.fullmatch(rf"{re.escape(version)} - (\d{{4}}-\d\d-\d\d|unreleased)", heading[1])
+    assert f"\nversion: {version}\n" in (project_root / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_links_of_the_description_lead_below_the_projects_address(project_root):
+    described = runpy.run_path(str(project_root / "hatch_build.py"))["described"]
+    text = "![a](docs/a.png) [b](docs/b.md) [c](https://c.example)"
+    assert described(text, None) == " b [c](https://c.example)"
+    at = "https://example.org/cocalib"
+    assert described(text, at) == f"![a]({at}/raw/HEAD/docs/a.png) [b]({at}/raw/HEAD/docs/b.md) [c](https://c.example)"
 
 
 def test_a_foreign_package_called_app_is_left_alone(wheel, tmp_path):
@@ -120,54 +170,38 @@ def test_a_foreign_package_called_app_is_left_alone(wheel, tmp_path):
     assert not (site / "cocalib").exists()
 
 
-def test_the_installed_command_serves_its_page(installed, tmp_path):
-    server = subprocess.Popen(
-        [installed / "bin" / "cocalib", "demo", "--no-browser", "--port", "0", "--session", tmp_path / "session"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1", "XDG_STATE_HOME": str(tmp_path / "state")},
-    )
-    try:
-        assert server.stdout is not None
-        link = next(
-            found[0] for line in server.stdout if (found := re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line))
-        )
-        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-        page = browser.open(link, timeout=30).read().decode()
-        assert "cocalib" in page
-        for part in ("page/main.js", "base/state.js", "space/pace.js"):
-            assert browser.open(link.partition("?")[0] + part, timeout=30).status == 200
-    finally:
-        server.terminate()
-        server.communicate()
-
-
-def test_the_installed_command_solves_its_sample_and_packs_it(installed, tmp_path):
-    code = "from cocalib.platform import resources; print(resources.sample_folder() / 'rooftop')"
-    sample = Path(
-        subprocess.run(
-            [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
-        ).stdout.strip()
-    )
-    out = tmp_path / "calibration.json"
+def test_the_installed_command_answers_on_its_page_and_solves_its_sample_and_pairs(installed, project_root, tmp_path):
     done = subprocess.run(
-        [
-            installed / "bin" / "cocalib",
-            "solve",
-            sample / "radar.bag",
-            sample / "camera.bag",
-            "--clicks",
-            sample / "clicks.json",
-            "--out",
-            out,
-        ],
+        [installed / "bin" / "python", project_root / ".ci" / "smoke"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        | {"XDG_STATE_HOME": str(tmp_path / "state")},
     )
     assert done.returncode == 0, done.stderr
-    assert json.loads(out.read_text())["schema"] == "cocalib/calibration-1"
+    assert str(installed) in done.stdout, "found in the checkout, not in the wheel"
+
+
+def test_every_format_is_exported_from_the_wheel(installed, project_root, tmp_path):
+    cocalib, sample = installed / "bin" / "cocalib", project_root / "sample_data" / "rooftop"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+    def run(*arguments: object) -> None:
+        subprocess.run([cocalib, *arguments], cwd=tmp_path, check=True, capture_output=True, env=environment)
+
+    run(
+        "solve",
+        sample / "radar.bag",
+        sample / "camera.bag",
+        "--clicks",
+        sample / "clicks.json",
+        "--out",
+        "calibration.json",
+    )
+    run("export", "calibration.json", "--to", "all", "--out", "files")
+    written = {path.name for path in (tmp_path / "files").iterdir()}
+    assert {known.file_name for known in (*FORMATS, *CAMERA_ONLY)} <= written
 
 
 def test_the_examples_run_from_the_wheel(installed, project_root, tmp_path):
@@ -308,7 +342,8 @@ def prepare(folder: Path, run: Callable[[str], object]) -> None:
 @pytest.mark.timeout(900)
 def test_the_command_lines_of_the_pages_run_from_the_wheel(installed, project_root, tmp_path):
     """In an empty folder with small simulated recordings, under the names that the pages give them."""
-    pages = [project_root / "README.md", *sorted((project_root / "docs").glob("*.md"))]
+    others = [] if _DIST else sorted((project_root / "docs").glob("*.md"))  # they need the extras
+    pages = [project_root / "README.md", *others]
     lines = list(dict.fromkeys(line for page in pages for line in command_lines(page)))
     ended: dict[str, tuple[int, str]] = {}
 
@@ -316,14 +351,15 @@ def test_the_command_lines_of_the_pages_run_from_the_wheel(installed, project_ro
         ended[line] = run_line(installed / "bin" / "cocalib", tmp_path, line)
 
     prepare(tmp_path, run)
-    run(next(line for line in lines if "--preset intrinsics" in line))
-    shutil.move(next((tmp_path / "somewhere").rglob("*.mcap")), tmp_path / "recording.mcap")
+    for line in (line for line in lines if "--preset intrinsics" in line):
+        run(line)
+        shutil.move(next((tmp_path / "somewhere").rglob("*.mcap")), tmp_path / "recording.mcap")
     assert {code for code, _ in ended.values()} == {0}, ended
     left_out = [line for line in lines if any(re.match(f"cocalib {pattern}", line) for pattern in _NOT_RUN)]
-    assert len(left_out) == 3
+    assert len(left_out) == (1 if _DIST else 3)
     for line in lines:
         if line not in ended and line not in left_out:
             run(line)
     assert [(line, said) for line, said in ended.items() if said[0] not in (0, 1, 3)] == []
-    made = "report.html overlay.mp4 lens.html left.yaml meanings.png out/results.csv session.json"
+    made = "" if _DIST else "report.html overlay.mp4 lens.html left.yaml meanings.png out/results.csv session.json"
     assert [name for name in made.split() if not (tmp_path / name).is_file()] == []
