@@ -74,7 +74,7 @@ test-lowest:  ## Run part of the tests with the lowest versions that pyproject.t
 test-newest:  ## The same with the newest allowed versions.
 	@$(PYTHON) .ci/test_bounds newest
 
-bench: dev  ## Measure speed, as ratios within one run; write docs/speed.md. BENCH=--large also opens 5 GB and 100 GB.
+bench: dev  ## Measure speed; write docs/speed.md. BENCH=--large also opens 5 GB and 100 GB.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/python -m benchmarks.speed $(BENCH)
 

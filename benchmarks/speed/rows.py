@@ -2,13 +2,15 @@
 
 import os
 import platform
-import sys
+import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-__all__ = ["Row", "Table", "page", "section"]
+import numpy as np
+
+__all__ = ["Row", "Table", "median_ms", "page", "section"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +19,8 @@ class Row:
 
     Attributes:
         what: what was measured.
-        figure: the measured value as text, with its unit; it is printed while measuring, and depends on the machine.
-        ratio: compared with another measurement in the same run; "" if there is none. Only ratios and aims are kept.
+        figure: the measured value as text, with its unit; a row without one is left out.
+        ratio: compared with another measurement in the same run; "" if there is none.
         aim: the value to reach; "" if there is none.
         met: whether the aim is met.
     """
@@ -44,7 +46,8 @@ def page(tables: Sequence[Table], *, command: str) -> str:
     lines = [
         "# Speed",
         "",
-        f"Written by `{command}`. Machine: {_machine()}. Ratios within this one run.",
+        f"Written by `{command}`. Machine: {_machine()}.",
+        "Medians, 95th percentiles in parentheses.",
     ]
     for table in tables:
         lines += ["", *section(table)]
@@ -52,12 +55,17 @@ def page(tables: Sequence[Table], *, command: str) -> str:
 
 
 def section(table: Table) -> list[str]:
-    """Return the ratios of one table in Markdown, under its heading; the figures are printed."""
-    for row in table.rows:
-        print(f"{row.what}: {row.figure}", file=sys.stderr)
-    head = [f"## {table.title}", "", table.how, "", "| what | ratio | aim |", "|---|---|---|"]
-    rows = [f"| {row.what} | {row.ratio} | {_aim(row)} |" for row in table.rows if row.ratio or row.aim]
-    return [*head, *rows]
+    """Return one table in Markdown, under its heading, with the commit that it was measured at."""
+    show = ["git", "show", "-s", "--format=%h, %as", "HEAD"]
+    commit = subprocess.run(show, cwd=Path(__file__).parent, check=True, capture_output=True, text=True).stdout.strip()
+    head = [f"## {table.title}", "", f"{table.how} Measured at {commit}.", ""]
+    rows = [f"| {row.what} | {row.figure} | {row.ratio} | {_aim(row)} |" for row in table.rows if row.figure]
+    return [*head, "| what | measured | compared | aim |", "|---|---|---|---|", *rows]
+
+
+def median_ms(times_ms: Sequence[float]) -> str:
+    """Return the median and the 95th percentile as text."""
+    return f"{np.median(times_ms):.0f} ms ({np.percentile(times_ms, 95):.0f} ms)"
 
 
 def _aim(row: Row) -> str:
