@@ -20,7 +20,7 @@ from benchmarks.accuracy.defects import (
     two_reflectors,
     wrong_lens,
 )
-from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
+from benchmarks.accuracy.fresh_seeds import FreshSeeds, fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
 from benchmarks.accuracy.page import page, table
 from benchmarks.accuracy.rows import Kept, Row, Section
@@ -67,9 +67,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--trials", type=int, default=None, help="sets per row instead of its own number")
     parser.add_argument(
         "--seed",
-        choices=("fixed", "fresh"),
         default="fixed",
-        help="fixed, or drawn from the present commit's hash (default: fixed)",
+        help="fixed, fresh: from the present commit's hash, or the hash of a run to repeat it",
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
@@ -88,9 +87,10 @@ def main() -> int:
     """Measure the accuracy and write the page. An interrupted run resumes if the code is unchanged."""
     arguments = _arguments()
     keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
-    fresh = None
     if arguments.seed == "fresh":
         fresh = last_fresh_seeds(keeper.folder) if arguments.write_only else fresh_seeds(keeper.folder)
+    else:
+        fresh = None if arguments.seed == "fixed" else FreshSeeds(arguments.seed)
     first = 0 if fresh is None else fresh.first_trial
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
     rows = [row for row in rows if not arguments.rows or any(fnmatch(row.key, one) for one in arguments.rows)]
@@ -99,7 +99,7 @@ def main() -> int:
     everything = [row for several in TABLES.values() for row in several]
     kept = kept_figures(everything, keeper, trials=arguments.trials, first=first)
     alone = arguments.only if arguments.alone and arguments.only else ()
-    command = "make bench-accuracy SEED=fresh" if fresh else "make bench-accuracy"
+    command = f"make bench-accuracy SEED={fresh.commit[:8]}" if fresh else "make bench-accuracy"
     if arguments.alone:
         command = shlex.join(["python", "-m", "benchmarks.accuracy", *sys.argv[1:]])
     measured = sections(kept, alone)

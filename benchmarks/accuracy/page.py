@@ -40,7 +40,7 @@ After ± are two standard errors. "Met": the figure reaches the aim. "Undecided"
 """
 
 _FIXED = "The draws are those of fixed seeds, which development may have seen."
-_FRESH = "The draws come from the hash of commit {commit}, after the code was written: nobody had seen them."
+_FRESH = "The draws come from a commit's hash, {commit}, after the code was written: nobody had seen them."
 
 
 def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "make bench-accuracy") -> str:
@@ -59,7 +59,7 @@ def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "m
         tape=_tape(sections),
         missed=sum(claim.verdict == MISSED for claim in claims),
         aims=len(claims),
-        seeds=_FRESH.format(commit=commit[:7]) if commit else _FIXED,
+        seeds=_FRESH.format(commit=commit[:8]) if commit else _FIXED,
     )
     return "\n".join([head, *(_section(name, section) for name, section in sections.items())])
 

@@ -20,11 +20,13 @@ class Row:
         key: unique, and usable as a file name.
         trials: the number of trials wanted.
         measure: returns the figures of a trial given its number; a module's function or a partial, so that it can be pickled.
+        draws: rows with another number never have the same draws, so that their shares can be pooled.
     """
 
     key: str
     trials: int
     measure: Callable[[int], Figures]
+    draws: int = 0
 
 
 @dataclass(frozen=True, slots=True)

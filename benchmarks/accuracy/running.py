@@ -14,7 +14,7 @@ from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["kept_figures", "run"]
 
-_CHUNK = 4
+_CHUNK, _APART = 4, 10_000
 
 _Measured = list[tuple[int, Figures]]
 
@@ -55,7 +55,7 @@ def _missing(row: Row, keeper: Keeper, trials: int | None, first: int) -> list[l
 
 
 def _measure(row: Row, trials: list[int]) -> _Measured:
-    return [(trial, row.measure(trial)) for trial in trials]
+    return [(trial, row.measure(trial + _APART * row.draws)) for trial in trials]
 
 
 class _Progress:

@@ -134,7 +134,8 @@ _CASES = {
     for part in _AIMS
 }
 ROWS = tuple(
-    Row(shared_key(case), _TRIALS, partial(measure_shared, case)) for part in _AIMS if part for case in _CASES[part]
+    Row(shared_key(case), _TRIALS, partial(measure_shared, case), draws)
+    for draws, case in enumerate((case for part in _AIMS if part for case in _CASES[part]), start=20)
 )
 """Those with a smooth error; the others are rows of the errors that all pairs share."""
 

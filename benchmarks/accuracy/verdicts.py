@@ -139,7 +139,7 @@ def _middle(points_radar_m: Points3, range_m: float) -> int:
 
 
 ROWS = (
-    *(Row(case.key, _TRIALS, partial(measure_verdict, case)) for case in _CASES),
+    *(Row(case.key, _TRIALS, partial(measure_verdict, case), draws) for draws, case in enumerate(_CASES)),
     *(Row(f"verdict-preset-{preset}", _RECORDINGS, partial(measure_recording, preset)) for preset in _PRESETS),
 )
 

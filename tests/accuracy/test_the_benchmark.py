@@ -94,7 +94,7 @@ def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run()
     measured = sections({"shared-field-ti-12-10pc-free": [SOUND] * 3})
     assert list(measured) == ["shared"]
     text = page(measured, commit=40 * "a")
-    assert "commit aaaaaaa," in text
+    assert "hash, aaaaaaaa," in text
     assert "not run" not in text
     assert table(measured["shared"].rows).splitlines()[1].startswith("ti 12 free,3,")
 

@@ -59,8 +59,11 @@ def _apart_key(noise: NoiseName) -> str:
 
 
 ROWS = (
-    *(Row(_key(case), _TRIALS, partial(measure_clean_draw, case)) for case in _CASES),
-    *(Row(_apart_key(noise), _APART_TRIALS, partial(measure_apart, noise)) for noise in _NOISES),
+    *(Row(_key(case), _TRIALS, partial(measure_clean_draw, case), draws) for draws, case in enumerate(_CASES)),
+    *(
+        Row(_apart_key(noise), _APART_TRIALS, partial(measure_apart, noise), draws)
+        for draws, noise in enumerate(_NOISES)
+    ),
 )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -68,9 +68,8 @@ def _key(noise: NoiseName, known: str) -> str:
 
 
 ROWS = tuple(
-    Row(_key(noise, known), _TRIALS, partial(measure_drag, noise, tape_m))
-    for noise in _NOISES
-    for known, tape_m in _TAPES.items()
+    Row(_key(noise, known), _TRIALS, partial(measure_drag, noise, _TAPES[known]), draws)
+    for draws, (noise, known) in enumerate(product(_NOISES, _TAPES))
 )
 
 

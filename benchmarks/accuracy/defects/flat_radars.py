@@ -64,7 +64,9 @@ def _held_out_px(everything: SimulatedPairs, pairs: int, outcome: object) -> flo
     return float(away_px.mean()) if np.isfinite(away_px).all() else None
 
 
-ROWS = tuple(Row(case.key, _TRIALS, partial(measure_flat, case.noise, case.pairs)) for case in _CASES)
+ROWS = tuple(
+    Row(case.key, _TRIALS, partial(measure_flat, case.noise, case.pairs), draws) for draws, case in enumerate(_CASES)
+)
 
 
 def section(kept: Kept) -> Section:

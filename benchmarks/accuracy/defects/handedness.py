@@ -85,7 +85,8 @@ def _rig(case: Hand, rng: np.random.Generator) -> Rig:
 
 
 ROWS = tuple(
-    Row(case.key, _MIRRORED if case.kind == "mirrored" else _RIGHT, partial(measure_hand, case)) for case in _CASES
+    Row(case.key, _MIRRORED if case.kind == "mirrored" else _RIGHT, partial(measure_hand, case), draws)
+    for draws, case in enumerate(_CASES)
 )
 
 

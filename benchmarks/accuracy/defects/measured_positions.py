@@ -127,8 +127,8 @@ def _key(slip: Slip, noise: NoiseName) -> str:
 
 _CASES = tuple(product(SLIPS, _NOISES))
 ROWS = tuple(
-    Row(_key(slip, noise), _RIGHT_TRIALS if slip.aim == "right" else _TRIALS, partial(measure, slip, noise))
-    for slip, noise in _CASES
+    Row(_key(slip, noise), _RIGHT_TRIALS if slip.aim == "right" else _TRIALS, partial(measure, slip, noise), draws)
+    for draws, (slip, noise) in enumerate(_CASES)
 )
 
 

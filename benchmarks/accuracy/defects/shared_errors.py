@@ -149,8 +149,8 @@ def shared_key(case: Shared) -> str:
 
 
 ROWS = tuple(
-    Row(shared_key(case), _MOST_TRIALS if case.pairs == 20 else _TRIALS, partial(measure_shared, case))
-    for case in _CASES
+    Row(shared_key(case), _MOST_TRIALS if case.pairs == 20 else _TRIALS, partial(measure_shared, case), draws)
+    for draws, case in enumerate(_CASES)
 )
 
 
