@@ -40,11 +40,7 @@ class Constant:
     path: Path
     node: ast.Constant
     said: str
-
-    @property
-    def has_unit(self) -> bool:
-        """Whether the name or the text beside it states a unit."""
-        return bool(UNIT.search(f"{self.name.rpartition('.')[0]} {self.said}"))
+    has_unit: bool
 
 
 def constants(path: Path, root: Path) -> Iterator[Constant]:
@@ -56,12 +52,9 @@ def constants(path: Path, root: Path) -> Iterator[Constant]:
     numbers, module = Counter[str](), path.relative_to(root / "calib_core").with_suffix("").as_posix()
     for owner, node, beside in numbers_of(ast.parse(path.read_text(encoding="utf-8")), "", ""):
         above = comments[node.lineno - 1] if node.lineno - 1 in alone else ""
-        yield Constant(
-            f"{module}:{owner}.{numbers[owner]}",
-            path,
-            node,
-            f"{above} {comments.get(node.lineno, '')} {beside}".strip(),
-        )
+        said = f"{above} {comments.get(node.lineno, '')} {beside}".strip()
+        unit = bool(UNIT.search(f"{owner} {said}"))
+        yield Constant(f"{module}:{owner}.{numbers[owner]}", path, node, said, unit)
         numbers[owner] += 1
 
 

@@ -26,8 +26,6 @@ from benchmarks.accuracy.page import page, table
 from benchmarks.accuracy.rows import Kept, Row, Section
 from benchmarks.accuracy.running import kept_figures, run
 
-__all__ = ["TABLES", "main", "sections"]
-
 _ROOT = Path(__file__).resolve().parents[2]
 _SECTIONS: dict[str, tuple[tuple[Row, ...], Callable[[Kept], Section]]] = {
     "shared": (shared_errors.ROWS, shared_errors.section),

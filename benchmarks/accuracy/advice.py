@@ -13,8 +13,6 @@ from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration
 
-__all__ = ["measure_advice"]
-
 _FIRST = 4  # the fewest that can be solved
 _SAME_FIELD = PlacementLimits(FIELD.min_range_m, FIELD.max_range_m, FIELD.max_azimuth_deg, FIELD.separation_m)
 

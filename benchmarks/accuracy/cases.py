@@ -29,8 +29,6 @@ from calib_core.options import (
 from calib_core.radar import covariance_from_sigma_polar, sigma_polar_of
 from calib_core.synthetic.rig import RigOptions, random_rig
 
-__all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "exact_instruments", "options_of", "tape_measured"]
-
 SceneName = Literal["field", "aisle"]
 
 _CROWD = 200  # with more pairs than this, placements may be close together

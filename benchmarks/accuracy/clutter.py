@@ -13,8 +13,6 @@ from calib_core.radar import direction_cosines
 from calib_core.results import Calibration
 from calib_core.synthetic.radar_returns import RadarProfile
 
-__all__ = ["SCENES", "measure_clutter"]
-
 _FAR = 4.5  # standard deviations of a placement's own error
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.defects.shared_errors import Shared, inside, measure_shared
+from benchmarks.accuracy.defects.shared_errors import Shared, measure_shared
+from benchmarks.accuracy.outcomes import inside
 from cocalib.batch.worker_processes import WorkerProcesses
 
 _CASES = tuple(

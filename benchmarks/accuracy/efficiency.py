@@ -14,8 +14,6 @@ from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.geometry import RigidTransform
 from calib_core.results import Calibration
 
-__all__ = ["ROWS", "errors_of", "failed", "inside", "measure_ours", "section"]
-
 _FAILED = 6.0  # times the bound
 _TRIALS = 50
 _AIM, _COMPARED = 1.15, 20

@@ -7,25 +7,6 @@ import numpy as np
 
 from benchmarks.accuracy.rows import Claim, Figures
 
-__all__ = [
-    "MET",
-    "MISSED",
-    "UNDECIDED",
-    "Measured",
-    "at_least",
-    "at_most",
-    "column",
-    "counted",
-    "low",
-    "ratio",
-    "rmse",
-    "share",
-    "stated_over_rmse",
-    "tally",
-    "within",
-    "worst",
-]
-
 MET, UNDECIDED, MISSED = "met", "undecided", "**missed**"
 
 
@@ -78,10 +59,11 @@ def share(flags: np.ndarray) -> Measured:
 
 
 def at_most(measured: Measured, limit: float) -> str:
-    """Return the verdict; above the limit by less than two standard errors is undecided."""
+    """Return the verdict; above the limit by less than two standard errors, or nothing to judge, is undecided."""
     if measured.value <= limit:
         return MET
-    return UNDECIDED if measured.value - measured.error <= limit else MISSED
+    beyond = np.isposinf(measured.value) or measured.value - measured.error > limit
+    return MISSED if beyond else UNDECIDED
 
 
 def at_least(measured: Measured, limit: float) -> str:
@@ -127,9 +109,10 @@ def stated_over_rmse(trials: Sequence[Figures], stated: str, name: str) -> Measu
 
 
 def tally(aim: str, judged: Sequence[tuple[str, str, str]]) -> Claim:
-    """Combine rows, each a name, a figure and a verdict, into one claim that names every row that is not met."""
+    """Combine rows, each a name, a figure and a verdict, into one claim that names every row that misses the aim."""
     counts = [f"{sum(verdict == MET for _, _, verdict in judged)} of {len(judged)} met"]
-    for kind in (MISSED, UNDECIDED):
-        names = [f"{name} {figure}" for name, figure, verdict in judged if verdict == kind]
-        counts += [f"{kind.strip('*')}: {', '.join(names)}"] if names else []
+    undecided = sum(verdict == UNDECIDED for _, _, verdict in judged)
+    counts += [f"{undecided} undecided"] if undecided else []
+    missed = [f"{name} {figure}" for name, figure, verdict in judged if verdict == MISSED]
+    counts += [f"missed: {', '.join(missed)}"] if missed else []
     return Claim(aim, "; ".join(counts), worst(verdict for _, _, verdict in judged))

@@ -5,8 +5,6 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["FreshSeeds", "fresh_seeds", "last_fresh_seeds"]
-
 _ROOT = Path(__file__).resolve().parents[2]
 _APART = 1_000_000  # more than any row has trials
 _FILE = "fresh.json"

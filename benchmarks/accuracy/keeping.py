@@ -8,8 +8,6 @@ from pathlib import Path
 
 from benchmarks.accuracy.rows import Figures
 
-__all__ = ["Keeper", "digest_of_sources", "sources"]
-
 _ROOT = Path(__file__).resolve().parents[2]
 _WRITING_ONLY = {"__main__.py", "figures.py", "fresh_seeds.py", "keeping.py", "page.py", "running.py"}
 

@@ -7,8 +7,6 @@ from benchmarks.accuracy.rows import Figures
 from benchmarks.simulated_pairs import SimulatedPairs
 from calib_core.geometry import RigidTransform
 
-__all__ = ["measure_many"]
-
 
 def measure_many(case: Case, trial: int) -> Figures:
     """Solve one trial by the default method and by plain PnP."""

@@ -17,8 +17,6 @@ from calib_core.paper.pnp import refine_lm, solve_pnp
 from calib_core.radar import sigma_polar_of
 from calib_core.results import Calibration
 
-__all__ = ["PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
-
 Method = Callable[[SimulatedPairs, Case], "RigidTransform | None"]
 
 _ITERATIONS = 2000

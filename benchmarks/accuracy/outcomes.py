@@ -13,20 +13,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
 
-__all__ = [
-    "LEVELS",
-    "codes_in",
-    "inside",
-    "level_counts",
-    "misleading",
-    "named",
-    "outcome_figures",
-    "quantile_999",
-    "silently_wrong",
-    "sold",
-    "solved_or_refused",
-]
-
 LEVELS: tuple[VerdictLevel, ...] = get_args(VerdictLevel)
 
 _CODE = "code "

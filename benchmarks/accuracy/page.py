@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from benchmarks.accuracy.figures import MISSED
 from benchmarks.accuracy.rows import Section
 
-__all__ = ["page", "table"]
-
 _HEAD = """# Accuracy
 
 Written by `{command}`; do not edit. Each question has a short table of aims here, and all its rows, with the

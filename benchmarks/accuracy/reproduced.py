@@ -15,8 +15,6 @@ from calib_core.geometry import RigidTransform, skew
 from calib_core.paper.pnp import solve_pnp
 from calib_core.radar import covariance_from_sigma_polar
 
-__all__ = ["bias_compensated_pnp", "gmlpnp", "unbiased_positions"]
-
 _STEPS, _NOISE_STEPS = 50, 30
 _CONVERGED = 1e-10
 _LEAST_SIGMA_M = 1e-6

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Claim", "Figures", "Kept", "Row", "Section"]
-
 Figures = dict[str, float | None]
 """The raw figures of one trial by name, as kept on disk; None if there is no figure (no pose)."""
 

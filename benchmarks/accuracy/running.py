@@ -12,8 +12,6 @@ from benchmarks.accuracy.rows import Figures, Kept, Row
 from cocalib.batch.engine import Engine, InProcess
 from cocalib.batch.worker_processes import WorkerProcesses
 
-__all__ = ["kept_figures", "run"]
-
 _CHUNK, _APART = 4, 10_000
 
 _Measured = list[tuple[int, Figures]]

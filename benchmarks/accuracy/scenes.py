@@ -12,8 +12,6 @@ from calib_core.synthetic.radar_returns import RADAR_PROFILES, RadarProfile, Tar
 from calib_core.synthetic.rig import Rig, random_rig
 from calib_core.synthetic.scene.scenes import PairsLayout
 
-__all__ = ["PLACEMENTS", "SCANS", "Scene", "Windows", "draw_windows"]
-
 PLACEMENTS = 20
 SCANS, _PERIOD_S = 30, 0.1
 _BETWEEN_S = 20.0

@@ -29,8 +29,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 
-__all__ = ["ROWS", "measure_smooth", "section"]
-
 _TRIALS = 64  # times two radars, with and without a tape: 256 a share
 _AIMS = {0.0: 95.0, 0.25: 93.0, 0.49: 90.0, 0.81: 90.0}
 _HELD_OUT = 100

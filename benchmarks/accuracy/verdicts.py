@@ -24,8 +24,6 @@ from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
 from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.recording import simulate
 
-__all__ = ["ROWS", "Verdicts", "measure_recording", "measure_verdict", "section", "share_inside"]
-
 _TRIALS, _RECORDINGS = 16, 2
 _UNSEEN = 20
 """Placements that are not used, but reprojected."""
@@ -166,7 +164,7 @@ def section(kept: Kept) -> Section:
         everything += trials
         name = row.key.removeprefix("verdict-")
         held = share(share_inside(trials, ("good", "usable")).astype(np.float64))
-        verdict = at_least(held, _AIM) if np.isfinite(held.value) else "none to judge"
+        verdict = at_least(held, _AIM)
         outside += [f"{name} ({held.value:.0f} %)"] if low(held) else []
         rows.append(
             {"row": name, "sets": str(len(trials))}

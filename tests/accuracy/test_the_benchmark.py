@@ -111,6 +111,14 @@ def test_every_row_of_the_errors_that_all_pairs_share_has_an_aim():
     assert all(row[aim] for row in measured["shared"].rows for aim in ("aim inside", "aim sigma", "aim position"))
 
 
+def test_rows_whose_shares_are_pooled_have_draws_of_their_own(tmp_path):
+    rows = [row for name in ("shared", "smooth") for row in TABLES[name]]
+    assert len({row.draws for row in rows}) == len(rows)
+    other = Row("other", 1, lambda trial: {"trial": float(trial)}, draws=2)
+    run([other], Keeper(tmp_path), jobs=1)
+    assert kept_figures([other], Keeper(tmp_path))["other"][0]["trial"] > 1000
+
+
 def test_a_run_that_is_cut_has_measured_the_same_share_of_each_row(tmp_path):
     rows = [
         Row("short", 8, lambda trial: {"trial": float(trial)}),
@@ -128,8 +136,8 @@ def test_a_run_that_is_cut_has_measured_the_same_share_of_each_row(tmp_path):
 
 
 def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant():
-    verdicts = [at_most(Measured(value, 0.04), 1.05) for value in (1.04, 1.07, 1.12)]
-    assert verdicts == [MET, UNDECIDED, MISSED]
+    verdicts = [at_most(Measured(value, 0.04), 1.05) for value in (1.04, 1.07, 1.12, float("nan"), float("inf"))]
+    assert verdicts == [MET, UNDECIDED, MISSED, UNDECIDED, MISSED]
     assert within(Measured(99.0, 1.0), 93.0, 97.0) == MISSED
 
 

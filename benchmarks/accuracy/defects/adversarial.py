@@ -22,8 +22,6 @@ from benchmarks.accuracy.outcomes import (
 )
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Row, Section
 
-__all__ = ["ALL", "ROWS", "highest_share", "measure_adversary", "section", "silent"]
-
 _TRIALS, _GAUGE_TRIALS, _SESSIONS = 24, 12, 4
 _HIGHEST_SHARE = 0.001
 _CONTRADICTORY = LEVELS.index("contradictory")

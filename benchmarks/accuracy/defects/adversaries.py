@@ -27,8 +27,6 @@ from calib_core.results import Calibration
 from calib_core.synthetic.rig import Rig, random_rig
 from calib_core.synthetic.scene.scenes import PairsLayout
 
-__all__ = ["FLAT", "Adversary", "Change", "Draw", "Solved", "draw_flat", "generator"]
-
 FLAT = SystematicErrors(measures_elevation=False)
 _EXACT = SystematicErrors()
 _DEFAULTS = CalibrationOptions()

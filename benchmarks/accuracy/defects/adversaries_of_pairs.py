@@ -24,8 +24,6 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.synthetic.scene.scenes import PairsLayout
 
-__all__ = ["ADVERSARIES_OF_PAIRS"]
-
 _TAPE_M = 0.01
 _RIGHT_M = 0.02
 _FREE_AISLE = PairsLayout(max_range_m=20.0, max_lateral_m=1.0)

@@ -11,8 +11,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
 
-__all__ = ["ADVERSARIES_OF_SCANS"]
-
 _COARSE = (0.15, 0.026, 0.052)  # 15 cm, 1.5 deg, 3 deg
 _ANOTHER = ("uncertain-association", "two-poses", "one-pair-decides")
 _FIRST_SEED = 880_001

@@ -15,8 +15,6 @@ from benchmarks.simulated_pairs import NoiseName, SystematicErrors, draw_systema
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 
-__all__ = ["ROWS", "measure_apart", "measure_clean_draw", "section"]
-
 _TRIALS = 28  # times twelve rows: 336
 _APART_TRIALS, _APART_M = 20, 3.0
 _AIM = 2.0  # percent

@@ -15,8 +15,6 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 
-__all__ = ["ROWS", "measure_drag", "section"]
-
 _TRIALS = 8
 _NOISES: tuple[NoiseName, ...] = ("ti", "imaging")
 _TAPES = {"tape": 0.01, "free": None}

@@ -16,8 +16,6 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 
-__all__ = ["ROWS", "measure_flat", "section"]
-
 _TRIALS = 40
 _NOISES: tuple[NoiseName, ...] = ("ti", "imaging")
 _COUNTS = (5, 8, 15)

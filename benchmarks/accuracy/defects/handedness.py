@@ -17,8 +17,6 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.synthetic.rig import Rig, random_rig
 
-__all__ = ["ROWS", "Hand", "measure_hand", "section"]
-
 _RIGHT, _MIRRORED = 12, 20  # times fourteen and eight cases: 168 and 160
 _NOISES: tuple[NoiseName, ...] = ("ti", "imaging")
 _Kind = Literal["mirrored", "right", "thrice", "flat", "zero"]

@@ -17,8 +17,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, HowMeasured, SolvingOptions
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig
 
-__all__ = ["ROWS", "measure", "section"]
-
 _TRIALS, _RIGHT_TRIALS = 30, 120
 _COUNTS = (12, 20, 40)
 _NOISES: tuple[NoiseName, ...] = ("ti", "imaging")

@@ -18,8 +18,6 @@ from calib_core.synthetic.files import radar_messages
 from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.recording import simulate
 
-__all__ = ["ROWS", "measure_returns", "section"]
-
 _TRIALS = 2
 _FIRST_SEED = 700
 _CLOSE: tuple[PresetName, ...] = ("two-reflectors-close", "two-reflectors-azimuths")

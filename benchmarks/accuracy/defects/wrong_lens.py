@@ -17,8 +17,6 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, LensOptions, RadarOptions, RefiningOptions
 
-__all__ = ["ROWS", "WrongLens", "board_covariance", "draw_wrong_lens", "measure_wrong_lens", "section"]
-
 _TRIALS = 24
 _FOCAL_AIM = 0.003
 
