@@ -348,7 +348,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     alternatives = find_alternatives(
         measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed
     )
-    solution = replace(solution, refined=alternatives.refined, uncertainty=alternatives.uncertainty)
+    solution = replace(solution, uncertainty=alternatives.uncertainty)
     calibration = _calibration_of(task, groups, measurements, solution)
     metrics = calibration.metrics
     solved_fit = SolvedFit(

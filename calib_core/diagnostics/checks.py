@@ -107,7 +107,7 @@ def _counted_up(warnings: list[DataWarning], inliers: Flags) -> list[DataWarning
 
 
 def _other_poses(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of a second pose, found from other starts or among the samples of the posterior."""
+    """Warn of a second pose, found from other starts or among the peaks of the posterior."""
     return two_poses(fit) or possible_poses(fit)
 
 

@@ -1,4 +1,4 @@
-"""Warnings about the pose as a whole: a second pose, also among the samples of the posterior or of the pairs set aside, and an
+"""Warnings about the pose as a whole: a second pose, also among the peaks of the posterior or of the pairs set aside, and an
 implausible camera position."""
 
 from dataclasses import replace
@@ -17,7 +17,6 @@ _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _WORTH_REFINING = 40.0
 _AS_A_WHOLE = 12.0  # the same, of the posterior's other peaks and of pairs that were set aside
 _OTHER_POSE_SIGMAS = 6.0
-_LEAST_PROBABILITY = 0.05
 _OTHER_PEAK_SIGMAS = 4.0
 
 
@@ -119,14 +118,10 @@ def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
 
 
 def possible_poses(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if the samples of the posterior lie about several separate poses."""
-    here = fit.refined.camera_from_radar
+    """Warn if the posterior has several separate peaks."""
     for other in fit.alternatives.possible:
-        error = other.camera_from_radar.error_from(here)
-        sigmas = float(np.sqrt(error @ np.linalg.solve(fit.uncertainty.covariance, error)))
-        if not on_rig(fit, other.camera_from_radar):
-            continue
-        if other.probability >= _LEAST_PROBABILITY and sigmas > _OTHER_PEAK_SIGMAS:
+        if other.sigmas > _OTHER_PEAK_SIGMAS and on_rig(fit, other.camera_from_radar):
+            error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
             return [DataWarning("two-poses", {**_away(error), "probability": other.probability})]
     return []
 

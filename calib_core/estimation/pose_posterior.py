@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Values, Vector3
+from calib_core.arrays import Values
 from calib_core.estimation.leave_one_out import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.measurement_model import MeasurementPlanes, PairMeasurements
-from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
+from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
 from calib_core.radar import position_planes
 
 
@@ -56,6 +56,10 @@ class Poses:
         u, _, vt = np.linalg.svd(self.rotations[index])
         return RigidTransform(u @ vt, self.translations_m[index])
 
+    def transforms(self) -> list[RigidTransform]:
+        """Return all of them, re-orthonormalised."""
+        return [self.transform(index) for index in range(len(self))]
+
 
 def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
     """Stack poses."""
@@ -82,7 +86,6 @@ _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # of a beta distribution of the shar
 _TAIL = 4.0  # the weak camera prior is a Cauchy distribution in three dimensions: density (1 + d^2 / sigma^2)^-2
 _NEAR = 6.0  # standard deviations beyond which a pair does not move its own true position
 _FAR_PX = 1e6  # residual of a position the camera cannot see
-_ROWS_AT_ONCE = 10_000  # whose intermediate arrays fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,74 +149,31 @@ class PairTerms:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosePosterior:
-    """The posterior of states: where a point among the placements moves (3) [m], rotation vector (3), log noise scales (4).
-
-    The rotation is about that point (the pivot), because rotating about the camera would shift all pixels along. Without
-    noise scales a state has six entries.
+    """The posterior of poses and noise levels.
 
     Attributes:
         measurements: the pairs with the assumed noise.
         candidates: every candidate row with its pair's click.
         log_outlier: (m,) logarithm of the density of each row's click if it is an outlier [1/px^2].
-        reference: the pose of state zero.
-        pivot_radar_m: (3,).
         d_polar: (2, 3, m) d pixel / d polar of each row at the reference; zeros where it does not see the position.
     """
 
     measurements: PairMeasurements
     candidates: MeasurementPlanes
     log_outlier: Values
-    reference: RigidTransform
-    pivot_radar_m: Vector3
     d_polar: np.ndarray
 
-    def about(self, reference: RigidTransform) -> "PosePosterior":
-        """Return the same posterior with another reference."""
-        poses = Poses(reference.rotation[None], reference.translation_m[None])
-        linear = self._linearized_at(poses, np.ones((1, 4)), self.candidates.polar[:, None])
-        return replace(self, reference=reference, d_polar=linear.d_polar[0])
-
-    def poses(self, states: np.ndarray) -> Poses:
-        """Return the poses of states (s, 6 or 10)."""
-        rotations = rotation_exp(states[:, 3:6]) @ self.reference.rotation
-        pivots_m = self.reference.rotation @ self.pivot_radar_m + self.reference.translation_m + states[:, :3]
-        return Poses(rotations, pivots_m - rotations @ self.pivot_radar_m)
-
-    def state_of(self, camera_from_radar: RigidTransform) -> Values:
-        """Return the six entries of a pose."""
-        error = camera_from_radar.error_from(self.reference)
-        turned = (camera_from_radar.rotation - self.reference.rotation) @ self.pivot_radar_m
-        return np.asarray(np.concatenate([error[:3] + turned, error[3:]]))
-
-    def state_jacobian(self, camera_from_radar: RigidTransform) -> Matrix66:
-        """Return d state / d (dt, dtheta) at a pose, which is exact for poses near the reference."""
-        jacobian = np.eye(6)
-        jacobian[:3, 3:] = -skew(camera_from_radar.rotation @ self.pivot_radar_m)
-        rotation_vector = self.state_of(camera_from_radar)[3:]
-        cross, angle = skew(rotation_vector), float(np.linalg.norm(rotation_vector))
-        half = 0.5 * angle
-        second = 1.0 / 12.0 if angle < 1e-4 else (1.0 - half / np.tan(half)) / angle**2
-        jacobian[3:, 3:] = np.eye(3) - 0.5 * cross + second * cross @ cross
-        return jacobian
-
-    def costs(self, states: np.ndarray) -> Values:
-        """Return twice the negative log posterior (s,) of states, up to a constant."""
-        at_once = max(_ROWS_AT_ONCE // self.candidates.polar.shape[1], 1)
-        parts = [self._costs(states[start : start + at_once]) for start in range(0, len(states), at_once)]
-        return np.concatenate(parts)
-
-    def _costs(self, states: np.ndarray) -> Values:
-        half = 0.5 * np.linalg.norm(states[:, 3:6], axis=1)  # equal volumes of rotations: Haar's measure
-        return self.pose_costs(self.poses(states), states[:, 6:]) - 4.0 * np.log(np.abs(np.sinc(half / np.pi)) + 1e-9)
-
     def pose_costs(self, poses: Poses, log_scales: np.ndarray) -> Values:
-        """Return the same (s,) of poses and noise, per unit volume of translations and rotations: the one place for it."""
+        """Return twice the negative log posterior (s,) of poses and noise, per unit volume of translations and rotations.
+
+        Args:
+            poses: s of them.
+            log_scales: (s, 4) logarithms of the noise over the assumed one.
+        """
         ratio = np.exp(np.minimum(self.pair_terms(poses, log_scales).pair, 500.0))
         mixed = np.log(_SHARES[:, None, None] * (ratio - 1.0) + 1.0).sum(axis=-1)
         costs = -2.0 * np.logaddexp.reduce(mixed + _LOG_SHARE_PRIOR[:, None], axis=0) + self.prior_costs(poses)
-        if log_scales.shape[1]:
-            costs += ((log_scales @ _SCALES_INFORMATION) * log_scales).sum(axis=1)
-        return np.asarray(costs)
+        return np.asarray(costs + ((log_scales @ _SCALES_INFORMATION) * log_scales).sum(axis=1))
 
     def prior_costs(self, poses: Poses) -> Values:
         """Return the share (s,) of the prior of the camera centre in the costs."""
@@ -229,9 +189,9 @@ class PosePosterior:
         return factor * hessians, factor * gradients
 
     def pair_terms(self, poses: Poses, log_scales: np.ndarray) -> PairTerms:
-        """Evaluate equation (6) at poses; log_scales is (s, 4), or (s, 0) for the assumed noise."""
+        """Evaluate equation (6) at poses, with the logarithms (s, 4) of the noise over the assumed one."""
         measurements = self.measurements
-        factors = np.exp(2.0 * log_scales) if log_scales.shape[1] else np.ones((len(poses), 4))
+        factors = np.exp(2.0 * log_scales)
         linear = self._linearized(poses, factors)
         squared = (linear.residual_px * linear.solved()).sum(axis=1)
         level = measurements.log_score - self.log_outlier - np.log(2.0 * np.pi)
@@ -294,19 +254,20 @@ class PosePosterior:
         return _Linear(residual_px, d_polar, noise, d_point, turned_m)
 
 
-def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pivot_radar_m: Vector3) -> PosePosterior:
+def pose_posterior(measurements: PairMeasurements, reference: RigidTransform) -> PosePosterior:
     """Prepare the posterior of all pairs.
 
     Args:
         measurements: with the assumed noise.
-        reference: the pose of state zero.
-        pivot_radar_m: (3,) a point among the placements.
+        reference: a likely pose.
     """
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
     log_outlier = measurements.log_outlier[measurements.owner]
     candidates = each.measured(np.arange(len(each.polar)))
     nothing = np.zeros((2, *candidates.polar.shape))
-    return PosePosterior(measurements, candidates, log_outlier, reference, pivot_radar_m, nothing).about(reference)
+    unplaced = PosePosterior(measurements, candidates, log_outlier, nothing)
+    linear = unplaced._linearized_at(batch_of([reference]), np.ones((1, 4)), candidates.polar[:, None])
+    return replace(unplaced, d_polar=linear.d_polar[0])
 
 
 def _log_share_prior() -> Values:
