@@ -41,8 +41,8 @@ def measure_solving() -> Table:
         "Simulated pairs of a TI-like radar in a field, 10 % of them wrong, one core; processor time, "
         "which depends least on other running programs. "
         "The preview is the pose with its noise levels, covariance and leave-one-out, from the previous answer's pose; the "
-        "checked answer adds every test, warning and other peak of the posterior. The others return only a pose, and are given the "
-        "best pixel threshold." + (f" Not installed here: {', '.join(missing)}." if missing else ""),
+        "checked answer adds every test, warning and other peak of the posterior. The others return only a pose, and are given "
+        "the best pixel threshold." + (f" Not installed here: {', '.join(missing)}." if missing else ""),
         tuple(rows),
     )
 
