@@ -173,7 +173,7 @@ function drawLook(look, place, board) {
     if (at) ring(at[0], at[1], row.used ? RING + 2 : RING, themeColour(row.used ? "attention" : "ink"), row.used ? 2 : 1.2, row.used ? [] : [3, 2]);
   }
   pen.font = smallFont(1, "600");
-  board.taken.push([board.width - 7 * smallPx(), 0, board.width, 3.5 * smallPx()]); // the button of the viewpoints
+  board.taken.push([board.width - 13 * smallPx(), 0, board.width, 3.5 * smallPx()]); // the buttons
   for (const { words, position_m, kind } of look.labels) {
     const reflector = kind === "selected" ? look.reflectors.find(({ id }) => id === state.selected) : undefined;
     const at = place(position_m, reflector?.pixel_px ?? null);
@@ -190,6 +190,10 @@ function drawLook(look, place, board) {
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;
   pen.font = smallFont();
+  for (const { position_m } of look.placements) {
+    const at = place(position_m, null);
+    if (at) board.taken.push([at[0] - RING, at[1] - RING, at[0] + RING, at[1] + RING]);
+  }
   const project = (/** @type {readonly number[]} */ point) => place(point, null);
   const size = (/** @type {number} */ range) => /** @type {[number, number]} */ ([pen.measureText(words(range)).width + 8, labelHigh()]);
   for (const { range, x, y } of ringPlaces(look.rings_m, look.ground_m, project, board, size)) write(words(range), x, y, "muted");

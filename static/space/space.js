@@ -3,7 +3,7 @@
 import { opened, register, withImages } from "../base/actions.js";
 import { icon, make } from "../base/notices.js";
 import { tab, tell } from "../base/socket.js";
-import { clicks, on, select, state } from "../base/state.js";
+import { clicks, emit, on, select, state } from "../base/state.js";
 import { comeTo } from "../image/arriving.js";
 import { choose } from "../image/candidates.js";
 import { addToCursor, tellCursor } from "../time/player.js";
@@ -119,7 +119,8 @@ function startChips() {
   cameraChip.dataset.viewpoint = "camera";
   largeChip.append(icon("large"));
   for (const [made, id] of /** @type {[HTMLElement, string][]} */ ([[cameraChip, "space-camera"], [largeChip, "space-large"], [hideChip, "space-hide"], [trailChip, "space-trail"], [colours, "space-colour"]])) made.id = id;
-  group.append(cameraChip, colours, trailChip, largeChip, hideChip);
+  group.append(cameraChip, colours, trailChip);
+  document.querySelector(".over-space")?.append(largeChip, hideChip);
   colours.setAttribute("aria-label", "What the colors of the returns mean");
   colours.dataset.hint = "What the colors of the returns mean";
   colours.onchange = () => change({ colour: /** @type {Colour} */ (colours.value) });
@@ -186,6 +187,7 @@ function arrange() {
   trailChip.textContent = trail ? `Last ${trail} s` : "One scan";
   trailChip.setAttribute("aria-pressed", String(trail > 0));
   colours.value = spaceColour();
+  emit("box");
 }
 
 /** What the colours mean. */

@@ -65,6 +65,24 @@ def test_a_recording_without_placements_says_what_it_is_good_for(page: Driver) -
     page.until("document.getElementById('opening-dialog').open")
 
 
+def test_zoomed_in_a_corner_shows_the_whole_image_and_leads_to_its_other_places(page: Driver) -> None:
+    inset = page.page.locator("#inset")
+    assert not inset.is_visible()
+    page.zoom_to(200, 150, 4)
+    inset.wait_for(state="visible")
+    box = inset.bounding_box()
+    assert box is not None
+    width, height = page.value("[__cocalib.viewport.imageWidth, __cocalib.viewport.imageHeight]")
+    assert box["width"] / box["height"] == pytest.approx(width / height, rel=0.05)
+    clicks = len(page.view["clicks"])
+    inset.click(position={"x": 0.75 * box["width"], "y": 0.5 * box["height"]})
+    middle = page.value("__cocalib.toImage(__cocalib.viewport.width / 2, __cocalib.viewport.height / 2)")
+    assert middle == pytest.approx([0.75 * width, 0.5 * height], abs=0.03 * width)
+    assert len(page.view["clicks"]) == clicks
+    page.press("f")
+    inset.wait_for(state="hidden")
+
+
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 2)

@@ -72,7 +72,7 @@ def test_without_webgl_the_pane_says_so_and_shows_the_returns_from_above(
 
 def open_views(page: Driver) -> None:
     """Show what the 3D view can be looked at from, and its colours."""
-    page.value("document.querySelector('.over-space').open = true")
+    page.value("document.querySelector('.over-space details').open = true")
 
 
 def look_from(page: Driver, viewpoint: str) -> None:
@@ -142,8 +142,12 @@ def choosing(page: Driver) -> None:
 
 
 def hidden_and_enlarged(page: Driver) -> None:
-    """Hidden it takes no room and gets nothing; enlarged it takes the place of the image; both are remembered."""
+    """Hidden it takes no room and gets nothing; enlarged it changes places with the image; both are remembered."""
     box = "JSON.stringify(document.getElementById('%s').getBoundingClientRect())"
+    page.press("b")
+    page.until(f"{box % 'space'} === {box % 'image-pane'}")
+    page.page.click("#inset")
+    page.until(f"{box % 'space'} !== {box % 'image-pane'} && document.getElementById('inset').hidden")
     page.press("b")
     page.until(f"{box % 'space'} === {box % 'image-pane'}")
     page.press("v")
@@ -220,6 +224,8 @@ def test_the_3d_view_shows_the_scene_and_says_before_a_pose_why_there_are_no_ret
     scene_without_visers_own_panels(page)
     keys_while_it_has_the_focus(page)
     open_views(page)
+    tops = "[...document.querySelectorAll('#viewpoints > *')].map((chip) => chip.getBoundingClientRect().top)"
+    assert page.value(f"new Set({tops}).size") == 1, "the menu is one line"
     page.page.click("#space-camera")
     page.until("document.querySelector('.space-readout').textContent.startsWith('No pose yet')")
     page.page.click("#space-camera")

@@ -1,5 +1,6 @@
 """How far the data reach, range rings to suit, and viewpoints from which all of it is in sight. In the radar frame, all pure."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -9,20 +10,24 @@ from calib_core.arrays import Points3, Values, Vector3
 from cocalib.web.messages.incoming import Viewpoint
 
 _MOST = 0.98
-"""The extent holds this share of the static returns; the rest may be ghosts or multipath."""
+"""The extent holds this share of the static returns along each axis; the rest may be ghosts or multipath."""
 _MOST_HEIGHTS = (0.05, 0.95)
-_NEAREST_M, _LEAST_ANGLE_RAD = 2.0, math.radians(15.0)
+_NEAREST_M = 2.0
 _RINGS = 6
 _BEYOND = 1.1
-"""The extent reaches this much beyond the farthest reflector or the farthest of most returns."""
-_FILLED = 0.9
-"""The data fill this share of the view."""
-_DIRECTIONS: dict[Viewpoint, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
-    "behind": ((math.cos(0.42), 0.0, -math.sin(0.42)), (0.0, 0.0, 1.0)),
-    "above": ((1e-3, 0.0, -1.0), (1.0, 0.0, 0.0)),
-    "side": ((0.0, math.cos(0.2), -math.sin(0.2)), (0.0, 0.0, 1.0)),
+"""The range reaches this much beyond the farthest reflector or the farthest of most returns."""
+_STEPS = 50
+"""Sides of the box are whole steps of the range divided by this: a recording that grows does not change the view every second."""
+_FILLED = 0.8
+"""The data fill this share of the view along one axis."""
+_ENOUGH = 0.5
+"""A viewer looks as level as leaves the data this share of the view along the other axis; else as steeply as is tried."""
+_DIRECTIONS: dict[Viewpoint, tuple[Vector3, Vector3, Values]] = {
+    "behind": (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.linspace(0.35, 0.95, 7)),
+    "above": (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([math.pi / 2 - 1e-3])),
+    "side": (np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.linspace(0.2, 0.8, 7)),
 }
-"""In which direction each viewpoint looks, and what is up."""
+"""In which direction each viewpoint looks, what is up, and how far below the horizon it may look [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,27 +36,20 @@ class Extent:
 
     Attributes:
         range_m: the farthest.
-        left_rad: azimuth of the left edge.
-        right_rad: azimuth of the right edge.
-        low_m: height of the lowest.
-        high_m: height of the highest.
+        low_m: the corner of the box to look at that is farthest back, right and down; the radar is in the box.
+        high_m: the opposite corner.
     """
 
     range_m: float
-    left_rad: float
-    right_rad: float
-    low_m: float
-    high_m: float
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
 
     def corners(self) -> Points3:
-        """Return points (n, 3) around it: the radar, and the arc at full range, at both heights."""
-        azimuths = np.linspace(self.right_rad, self.left_rad, 7)
-        arc = self.range_m * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=1)
-        flat = np.concatenate([np.zeros((1, 3)), arc])
-        return np.concatenate([flat + np.array([0.0, 0.0, height_m]) for height_m in (self.low_m, self.high_m)])
+        """Return the corners (8, 3) of the box."""
+        return np.array(list(itertools.product(*zip(self.low_m, self.high_m, strict=True))))
 
 
-UNKNOWN = Extent(12.0, math.radians(45.0), math.radians(-45.0), -1.0, 1.0)
+UNKNOWN = Extent(12.0, (0.0, -8.0, -1.0), (12.0, 8.0, 1.0))
 """What is assumed before anything is known."""
 
 
@@ -63,15 +61,22 @@ class Stand:
         position_m: (3,).
         look_at_m: (3,) in the middle of the data, so that the view turns about it.
         up: (3,).
+        filled: shares of the view's width and height that the data fill.
     """
 
     position_m: Vector3
     look_at_m: Vector3
     up: Vector3
+    filled: Values
+
+    @property
+    def distance_m(self) -> float:
+        """From the middle of the data."""
+        return float(np.linalg.norm(self.look_at_m - self.position_m))
 
 
 def extent_of(points_radar_m: Points3, weights: Values, reflectors_radar_m: Points3) -> Extent:
-    """Return what holds 98 % of the static returns by weight, and every reflector.
+    """Return a range that holds 98 % of the static returns by weight, and a box of the reflectors, or without any of the returns.
 
     Args:
         points_radar_m: (n, 3) static returns.
@@ -86,18 +91,19 @@ def extent_of(points_radar_m: Points3, weights: Values, reflectors_radar_m: Poin
         return UNKNOWN
     if not weight.sum() > 0:
         weight = np.ones(len(points))
-    ranges, azimuths = np.linalg.norm(points, axis=1), np.arctan2(points[:, 1], points[:, 0])
+    ranges = np.linalg.norm(points, axis=1)
     placed = reflectors_radar_m[np.isfinite(reflectors_radar_m).all(axis=1)]
-    far = max([_quantile(ranges, weight, _MOST), *np.linalg.norm(placed, axis=1).tolist()])
-    sides = np.arctan2(placed[:, 1], placed[:, 0]).tolist()
-    left = max([_quantile(azimuths, weight, 0.5 + _MOST / 2), *sides, _LEAST_ANGLE_RAD])
-    right = min([_quantile(azimuths, weight, 0.5 - _MOST / 2), *sides, -_LEAST_ANGLE_RAD])
-    low, high = (_quantile(points[:, 2], weight, share) for share in _MOST_HEIGHTS)
-    heights = placed[:, 2].tolist()
-    return Extent(
-        max(_NEAREST_M, float(f"{_BEYOND * far:.2g}")), _whole_degrees(left), _whole_degrees(right),
-        round(min([low, *heights, 0.0]), 1), round(max([high, *heights, 0.0]), 1),
-    )  # fmt: skip
+    far_m = max([_quantile(ranges, weight, _MOST), *np.linalg.norm(placed, axis=1).tolist()])
+    range_m = max(_NEAREST_M, float(f"{_BEYOND * far_m:.2g}"))
+    heights_m = [_quantile(points[:, 2], weight, share) for share in _MOST_HEIGHTS]
+    box_m = [placed[:, axis].tolist() for axis in (0, 1)]
+    if not len(placed):
+        box_m = [[_quantile(points[:, axis], weight, share) for share in (1.0 - _MOST, _MOST)] for axis in (0, 1)]
+    box_m.append([*heights_m, *placed[:, 2].tolist()])
+    low_m, high_m = np.array([[min([0.0, *side]), max([0.0, *side])] for side in box_m]).T
+    steps_m = np.array([range_m / _STEPS, range_m / _STEPS, 0.1])
+    low_m, high_m = np.floor(low_m / steps_m - 0.5) * steps_m, np.ceil(high_m / steps_m + 0.5) * steps_m
+    return Extent(range_m, _rounded(low_m), _rounded(high_m))
 
 
 def ring_ranges_m(range_m: float) -> tuple[float, ...]:
@@ -110,10 +116,7 @@ def ring_ranges_m(range_m: float) -> tuple[float, ...]:
 
 
 def fitted_stand(extent: Extent, viewpoint: Viewpoint, field_of_view_rad: float, aspect: float) -> Stand:
-    """Return where to stand so that the whole extent is in sight, as near as possible.
-
-    With camera coordinates x to the right, y up and z ahead, a corner is in sight if |x - x0| <= tan(half the angle) (z - z0),
-    and so for y; the largest z0 that leaves room for all corners follows directly.
+    """Return where to stand so that the whole box is in sight, as near as possible, and no strip.
 
     Args:
         extent: to be seen.
@@ -121,25 +124,38 @@ def fitted_stand(extent: Extent, viewpoint: Viewpoint, field_of_view_rad: float,
         field_of_view_rad: the vertical angle of the view.
         aspect: width of the view divided by its height.
     """
-    direction, up = (np.array(vector) for vector in _DIRECTIONS[viewpoint])
-    direction = direction / np.linalg.norm(direction)
+    forward, up, tilts_rad = _DIRECTIONS[viewpoint]
+    tangents = math.tan(field_of_view_rad / 2.0) * np.array([aspect, 1.0])
+    down = np.array([0.0, 0.0, -1.0])
+    stands = [
+        _nearest_stand(extent, math.cos(tilt) * forward + math.sin(tilt) * down, up, tangents) for tilt in tilts_rad
+    ]
+    return next((stand for stand in stands if stand.filled.min() >= _ENOUGH), stands[-1])
+
+
+def _nearest_stand(extent: Extent, direction: Vector3, up: Vector3, tangents: Values) -> Stand:
+    """Return the nearest stand from which the box fills no more than its share of the view.
+
+    With camera coordinates x to the right, y up and z ahead, a corner is in sight if |x - x0| <= tan(half the angle) (z - z0),
+    and so for y; the largest z0 that leaves room for all corners follows directly.
+    """
     right = np.cross(direction, up)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(right, direction), direction])
     corners = extent.corners() @ axes.T
-    tangents = _FILLED * math.tan(field_of_view_rad / 2.0) * np.array([aspect, 1.0])
-    beyond_m = (corners[:, :2] - tangents * corners[:, 2:]).max(axis=0)
-    before_m = (-corners[:, :2] - tangents * corners[:, 2:]).max(axis=0)
-    ahead_m = float((-(beyond_m + before_m) / (2.0 * tangents)).min())
+    inner = _FILLED * tangents
+    beyond_m = (corners[:, :2] - inner * corners[:, 2:]).max(axis=0)
+    before_m = (-corners[:, :2] - inner * corners[:, 2:]).max(axis=0)
+    ahead_m = float((-(beyond_m + before_m) / (2.0 * inner)).min())
     position = np.array([*((beyond_m - before_m) / 2.0), ahead_m])
-    middle_m = float(corners[:, 2].mean())
-    target = np.array([position[0], position[1], middle_m])
-    return Stand(position @ axes, target @ axes, up)
+    seen = (corners[:, :2] - position[:2]) / (corners[:, 2:] - ahead_m) / tangents
+    target = np.array([position[0], position[1], float(corners[:, 2].mean())])
+    return Stand(position @ axes, target @ axes, up, np.ptp(seen, axis=0) / 2.0)
 
 
-def _whole_degrees(angle_rad: float) -> float:
-    """Round an angle, so that a recording that grows does not change the view every second."""
-    return math.radians(round(math.degrees(angle_rad)))
+def _rounded(corner_m: Values) -> tuple[float, float, float]:
+    x_m, y_m, z_m = np.round(corner_m, 6).tolist()
+    return x_m, y_m, z_m
 
 
 def _quantile(values: Values, weights: Values, share: float) -> float:

@@ -43,18 +43,21 @@ class SizedClouds:
     def __init__(self, scene: "viser.SceneApi", name: str) -> None:
         self._clouds = [add_cloud(scene, f"{name}_{number}", 0.12 * size) for number, size in enumerate(SIZES)]
 
-    def fill(self, points_m: Points3, colours: np.ndarray, classes: Indices, size_m: float) -> None:
+    def resize(self, size_m: float) -> None:
+        """Give the middle class a size."""
+        for cloud, size in zip(self._clouds, SIZES, strict=True):
+            cloud.point_size = size_m * size
+
+    def fill(self, points_m: Points3, colours: np.ndarray, classes: Indices) -> None:
         """Draw returns.
 
         Args:
             points_m: (n, 3).
             colours: (n, 3).
             classes: (n,) of their sizes.
-            size_m: of the middle class.
         """
         for number, cloud in enumerate(self._clouds):
             rows = classes == number
-            cloud.point_size = size_m * SIZES[number]
             fill_cloud(cloud, points_m[rows], colours[rows])
 
 
@@ -121,7 +124,7 @@ class Colouring:
         if self.colour == "doppler":
             return -self.fastest_mps, self.fastest_mps
         if self.colour == "height":
-            return self.extent.low_m, max(self.extent.high_m, self.extent.low_m + 0.1)
+            return self.extent.low_m[2], self.extent.high_m[2]
         return self.snr_db if self.colour == "amplitude" else None
 
 

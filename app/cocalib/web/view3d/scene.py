@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calib_core.arrays import Points3, Vector3
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
+from cocalib.view.model import PlacementState
+from cocalib.web.frames import Frame
 from cocalib.web.messages.incoming import Viewpoint
 from cocalib.web.view3d.extent import UNKNOWN, Extent, fitted_stand, ring_ranges_m
-from cocalib.web.view3d.returns import SizedClouds, size_classes
+from cocalib.web.view3d.returns import SizedClouds, map_colours, size_classes
 from cocalib.web.view3d.shapes import (
     DARK,
     LIGHT,
@@ -29,13 +32,6 @@ from cocalib.web.view3d.sight import Sight, ground_m, true_positions
 
 if TYPE_CHECKING:
     import viser
-from typing import TYPE_CHECKING
-
-from cocalib.view.model import PlacementState
-from cocalib.web.view3d.returns import map_colours
-
-if TYPE_CHECKING:
-    import viser
 
 
 STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
@@ -46,10 +42,12 @@ FIELD_OF_VIEW_RAD = 0.75
 _MOST_ELLIPSOIDS = 200
 _LARGE_PX = 30.0  # as in static/base/colours.js: a colour means the same after every click
 """More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
-_USUAL_RANGE_M, _USUAL_SIZE_M = 12.0, 0.12
-"""The size of a return of middle strength in data that reach so far [m]; farther data have larger returns, by the square root."""
+_MARGIN = 1.15
+"""An image hides what is so much wider than it: a placement has a ring."""
+_AXES_SHARE, _FRUSTUM_SHARE, _RETURN_SHARE = 0.03, 0.035, 0.005
+"""Sizes of the radar's axes, the camera's frustum and a return of middle strength, as shares of the viewer's distance."""
 _DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
-_USUAL_ASPECT = 1.4
+_USUAL_ASPECT, _SAME_ASPECT = 1.4, 0.02
 
 
 class TabScene:
@@ -58,12 +56,14 @@ class TabScene:
     def __init__(self, client: "viser.ClientHandle") -> None:
         self._client = client
         self._lock = threading.Lock()
-        self._imaged: int | None = None
+        self._image: Frame | None = None
+        self._places_m = np.zeros((0, 3))
+        self._camera_from_radar = nominal_camera_from_radar()
         self._posed: object = self
         self._paired: object = None
         self._extent: Extent | None = None
         self._viewpoint: Viewpoint = "behind"
-        self._stood_at = np.array(STAND_AT)
+        self._stood_at, self._aspect = np.array(STAND_AT), 0.0
         scene = client.scene
         scene.configure_default_lights(
             False
@@ -93,6 +93,7 @@ class TabScene:
             color=_DIM,
             format="jpeg",
         )
+        client.camera.on_update(lambda _: self._follow_viewer())
 
     def show(self, sight: Sight) -> None:
         """Draw a Sight."""
@@ -106,7 +107,9 @@ class TabScene:
                 self._show_pose(sight)
                 self._show_pairs(sight)
                 self._show_advice(sight)
-                self._show_image(sight)
+                self._image = sight.image or self._image
+                self._places_m = sight.placements_m()
+                self._show_image()
             self._shown.position = (float(sight.index), float(sight.number), 0.0)  # the page reads which frame this is
         self._client.flush()
 
@@ -117,15 +120,37 @@ class TabScene:
         self._client.flush()
 
     def _look_from(self, viewpoint: Viewpoint) -> None:
+        """Stand where the data fill the view; what marks a place keeps its size on the screen."""
         camera = self._client.camera
-        stand = fitted_stand(self._extent or UNKNOWN, viewpoint, FIELD_OF_VIEW_RAD, _aspect_of(camera))
+        self._aspect = _aspect_of(camera)
+        stand = fitted_stand(self._extent or UNKNOWN, viewpoint, FIELD_OF_VIEW_RAD, self._aspect)
         with self._client.atomic():
             camera.up_direction = tuple(stand.up)
             camera.position, camera.look_at = tuple(stand.position_m), tuple(stand.look_at_m)
+            length_m, size_m = _AXES_SHARE * stand.distance_m, _RETURN_SHARE * stand.distance_m
+            self._axes.axes_length, self._axes.axes_radius, self._axes.origin_radius = (
+                np.array([1.0, 0.024, 0.04]) * length_m
+            )
+            self._frustum.scale = _FRUSTUM_SHARE * stand.distance_m
+            self._returns.resize(size_m)
+            self._window.point_size, self._chosen.point_size = 0.5 * size_m, 1.8 * size_m
         self._viewpoint, self._stood_at = viewpoint, stand.position_m
+        self._show_image()
+
+    def _follow_viewer(self) -> None:
+        """Fit a view of another shape to the data unless the user has moved it, and keep the image off the placements."""
+        with self._lock:
+            if abs(_aspect_of(self._client.camera) - self._aspect) > _SAME_ASPECT and self._is_still():
+                self._look_from(self._viewpoint)
+            self._show_image()
+        self._client.flush()
+
+    def _is_still(self) -> bool:
+        """Say whether the view is where it was put."""
+        return np.allclose(self._client.camera.position, self._stood_at, atol=1e-3)
 
     def _show_extent(self, sight: Sight) -> None:
-        """Fit rings, grid, sizes and, unless the user has moved it, the viewpoint to the data once they are known."""
+        """Fit rings, grid and, unless the user has moved it, the viewpoint to the data once they are known."""
         if sight.colouring.extent == self._extent:
             return
         self._extent = sight.colouring.extent
@@ -135,15 +160,7 @@ class TabScene:
         self._grid.width = self._grid.height = across_m
         self._grid.cell_size, self._grid.section_size = step_m / 5.0, step_m
         self._grid.fade_distance = 3.0 * across_m
-        growth = _growth(sight.colouring.extent)
-        self._axes.axes_length, self._axes.axes_radius, self._axes.origin_radius = (
-            0.5 * growth,
-            0.012 * growth,
-            0.02 * growth,
-        )
-        self._frustum.scale = 0.9 * growth
-        self._window.point_size, self._chosen.point_size = 0.5 * growth * _USUAL_SIZE_M, 1.8 * growth * _USUAL_SIZE_M
-        if np.allclose(self._client.camera.position, self._stood_at, atol=1e-3):
+        if self._is_still():
             self._look_from(self._viewpoint)
 
     def _show_theme(self, sight: Sight) -> None:
@@ -160,7 +177,7 @@ class TabScene:
         returns, window = sight.returns, sight.window
         colours = sight.colouring.of(returns, sight.trail_s)
         classes = size_classes(returns.snr_db, sight.colouring.snr_db)
-        self._returns.fill(returns.points_m, colours, classes, _growth(sight.colouring.extent) * _USUAL_SIZE_M)
+        self._returns.fill(returns.points_m, colours, classes)
         fill_cloud(
             self._window, window.points_m, np.tile(np.array([self._palette.window], dtype=np.uint8), (len(window), 1))
         )
@@ -173,8 +190,8 @@ class TabScene:
         self._posed = outcome
         calibration = sight.calibration
         camera = calibration.camera if calibration else sight.camera
-        camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
-        _place(self._frustum, camera_from_radar.inverse())
+        self._camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
+        _place(self._frustum, self._camera_from_radar.inverse())
         self._frustum.color = self._palette.solved if isinstance(outcome, Calibration) else _DIM
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
@@ -216,13 +233,18 @@ class TabScene:
         place = advice.best.position_radar_m
         fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.colouring.extent.range_m)))
 
-    def _show_image(self, sight: Sight) -> None:
-        image = sight.image
-        if image is None or image.header.index == self._imaged:
-            return
-        self._imaged = image.header.index
-        self._frustum._format = "jpeg"
-        self._frustum._image_data = image.data  # compressed bytes as they are; the public property encodes again
+    def _show_image(self) -> None:
+        """Show the image in the frustum, or its outline alone where it would hide a placement from the viewer."""
+        size = self._frustum.scale * np.array(self._frustum.compute_canonical_frustum_size())
+        viewer = self._camera_from_radar @ np.array(self._client.camera.position)
+        data = (
+            None
+            if self._image is None or _is_hidden(self._camera_from_radar @ self._places_m, viewer, size)
+            else self._image.data
+        )
+        if data is not self._frustum._image_data:
+            self._frustum._format = "jpeg"
+            self._frustum._image_data = data  # compressed bytes as they are; the public property encodes again
 
 
 def _ground(scene: "viser.SceneApi") -> tuple[Any, Any]:
@@ -234,14 +256,24 @@ def _ground(scene: "viser.SceneApi") -> tuple[Any, Any]:
     return grid, add_lines(scene, "/ground/rings", 1.2, DARK.rings)
 
 
-def _growth(extent: Extent) -> float:
-    """Return how much larger everything is drawn than in data of the usual extent."""
-    return float(np.sqrt(extent.range_m / _USUAL_RANGE_M))
-
-
 def _aspect_of(camera: Any) -> float:
     """Return width divided by height of the view; a usual one before it has been drawn, or while it is hidden."""
     return camera.image_width / camera.image_height if camera.image_width and camera.image_height else _USUAL_ASPECT
+
+
+def _is_hidden(points_m: Points3, viewer_m: Vector3, size_m: Vector3) -> bool:
+    """Say whether the image of a frustum is between a viewer and any point, all in the camera's frame.
+
+    Args:
+        points_m: (n, 3).
+        viewer_m: (3,).
+        size_m: (3,) width and height of the image, and its distance from the camera.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (size_m[2] - viewer_m[2]) / (points_m[:, 2] - viewer_m[2])
+        crossing_m = viewer_m + share[:, None] * (points_m - viewer_m)
+    inside = (np.abs(crossing_m[:, :2]) < _MARGIN * size_m[:2] / 2.0).all(axis=1)
+    return bool(np.any(inside & (share > 0.0) & (share < 1.0)))
 
 
 def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
@@ -283,8 +315,7 @@ class SurveyNodes:
         if placed == self._placed:
             return
         self._placed = placed
-        positions = np.array([placement.position_radar_m for placement in sight.placements]).reshape(-1, 3)
-        places = sight.errors.corrected(positions)
+        places = sight.placements_m()
         colours: dict[PlacementState, tuple[int, int, int]] = {"open": palette.next, "marked": palette.rings}
         for state, rings in self._rings.items():
             chosen = np.array([one == state for one in states], dtype=bool)

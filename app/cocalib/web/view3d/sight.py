@@ -76,6 +76,11 @@ class Sight:
         """The radar's estimated errors, which are taken out of all positions."""
         return self.calibration.radar_errors if self.calibration else RadarErrors()
 
+    def placements_m(self) -> Points3:
+        """Return where the placements (n, 3) truly are."""
+        positions = np.array([placement.position_radar_m for placement in self.placements]).reshape(-1, 3)
+        return self.errors.corrected(positions)
+
     def placement_states(self) -> tuple[PlacementState, ...]:
         """Say what became of each placement."""
         of_clicks = placements_of_clicks(self.session, self.placements)
@@ -135,8 +140,7 @@ def _reflectors(calibration: Calibration, pairs: tuple[PairResult, ...]) -> Iter
 
 
 def _placements(sight: Sight) -> tuple[SpacePlacement, ...]:
-    positions = np.array([placement.position_radar_m for placement in sight.placements]).reshape(-1, 3)
-    points = sight.errors.corrected(positions)
+    points = sight.placements_m()
     rows = zip(points, pixels_of(sight.calibration, points), sight.placement_states(), strict=True)
     return tuple(SpacePlacement(_rounded(point), _pixel(pixel), state) for point, pixel, state in rows)
 

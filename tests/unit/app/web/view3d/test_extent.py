@@ -17,8 +17,20 @@ def test_two_ghosts_of_a_hundred_returns_do_not_stretch_a_room_but_a_far_reflect
     assert 6.0 < extent_of(points, weights, NO_POINTS).range_m < 7.5
     reached = extent_of(points, weights, np.array([[30.0, 30.0, 1.5]]))
     assert 43.0 < reached.range_m < 48.0
-    assert reached.high_m == 1.5
-    assert reached.left_rad == pytest.approx(np.pi / 4)
+    assert 30.0 <= reached.high_m[1] <= 32.0
+    assert 1.5 <= reached.high_m[2] <= 1.7
+    assert reached.low_m[0] <= 0.0, "the radar is in sight"
+
+
+def test_the_box_is_of_the_reflectors_and_without_any_of_most_returns():
+    room = np.column_stack([np.linspace(1.0, 6.0, 198), np.linspace(-2.0, 2.0, 198), np.zeros(198)])
+    points = np.concatenate([room, [[180.0, 0.0, 0.0], [0.0, -190.0, 20.0]]])
+    without = extent_of(points, np.ones(200), NO_POINTS)
+    assert np.allclose(without.low_m, (0.0, -2.0, 0.0), atol=0.3), "two ghosts do not widen it"
+    assert np.allclose(without.high_m, (6.0, 2.0, 0.0), atol=0.3)
+    placed = extent_of(points, np.ones(200), np.array([[4.0, 1.0, 0.5], [3.0, -1.0, 0.5]]))
+    assert np.allclose(placed.low_m, (0.0, -1.0, 0.0), atol=0.3)
+    assert np.allclose(placed.high_m, (4.0, 1.0, 0.5), atol=0.3)
 
 
 def test_what_was_seen_all_the_time_counts_more_than_what_was_seen_once():
@@ -60,21 +72,33 @@ def test_there_are_two_to_six_rings_and_the_last_holds_everything(range_m):
 
 extents = st.builds(
     Extent,
-    range_m=st.floats(2.0, 300.0),
-    left_rad=st.floats(0.26, 3.0),
-    right_rad=st.floats(-3.0, -0.26),
-    low_m=st.floats(-5.0, 0.0),
-    high_m=st.floats(0.0, 20.0),
+    range_m=st.just(300.0),
+    low_m=st.tuples(st.floats(-300.0, 0.0), st.floats(-300.0, -0.1), st.floats(-5.0, -0.1)),
+    high_m=st.tuples(st.floats(0.5, 300.0), st.floats(0.0, 300.0), st.floats(0.0, 20.0)),
 )
 
 
 @given(extents, st.sampled_from(["behind", "above", "side"]), st.floats(0.4, 3.0))
-def test_from_every_viewpoint_all_of_the_data_is_in_sight_and_fills_the_view(extent, viewpoint, aspect):
-    stand, angle_rad = fitted_stand(extent, viewpoint, 0.75, aspect), 0.75
-    ahead = (stand.look_at_m - stand.position_m) / np.linalg.norm(stand.look_at_m - stand.position_m)
+def test_from_every_viewpoint_all_of_the_box_is_in_sight_and_fills_the_view_along_one_axis(extent, viewpoint, aspect):
+    stand = fitted_stand(extent, viewpoint, 0.75, aspect)
+    ahead = (stand.look_at_m - stand.position_m) / stand.distance_m
     right = np.cross(ahead, stand.up) / np.linalg.norm(np.cross(ahead, stand.up))
     seen = (extent.corners() - stand.position_m) @ np.stack([right, np.cross(right, ahead), ahead]).T
     assert seen[:, 2].min() > 0, "nothing is behind the viewer"
-    tangent = np.tan(angle_rad / 2.0)
-    shares = np.abs(seen[:, :2] / seen[:, 2:]) / [tangent * aspect, tangent]
-    assert shares.max() == pytest.approx(0.9, abs=1e-6)
+    tangent = np.tan(0.75 / 2.0)
+    places = seen[:, :2] / seen[:, 2:] / [tangent * aspect, tangent]
+    assert np.abs(places).max() < 0.95
+    assert 0.6 < (np.ptp(places, axis=0) / 2.0).max() < 0.95
+    assert stand.filled == pytest.approx(np.ptp(places, axis=0) / 2.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("viewpoint", ["behind", "side"])
+def test_a_long_road_is_no_strip_from_behind_and_looked_at_more_steeply_from_the_side_than_a_room(viewpoint):
+    road = Extent(250.0, (0.0, -25.0, -2.0), (250.0, 25.0, 6.0))
+    room = Extent(10.0, (0.0, -5.0, -1.0), (10.0, 5.0, 4.0))
+    tilts = []
+    for extent in (road, room):
+        stand = fitted_stand(extent, viewpoint, 0.75, 1.4)
+        tilts.append((stand.position_m - stand.look_at_m)[2] / stand.distance_m)
+        assert stand.filled.min() >= (0.15 if viewpoint == "side" and extent is road else 0.5)
+    assert tilts[0] >= tilts[1] if viewpoint == "side" else tilts[0] < 0.8

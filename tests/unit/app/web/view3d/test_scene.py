@@ -107,7 +107,10 @@ class Drawn:
     """A 3D view over a real viser server, with the client's camera recorded."""
 
     def __init__(self, server: Any) -> None:
-        self.camera = SimpleNamespace(position=(-5.0, 0.0, 3.6), image_width=1600, image_height=1000)
+        self.moved: list[Any] = []
+        self.camera = SimpleNamespace(
+            position=(-5.0, 0.0, 3.6), image_width=1600, image_height=1000, on_update=self.moved.append
+        )
         client = SimpleNamespace(scene=server.scene, camera=self.camera, atomic=server.atomic, flush=server.flush)
         self.scene = TabScene(client)
         self.node = server.scene.get_handle_by_name
@@ -231,7 +234,7 @@ def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn, viewpoint):
 def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_moved_it(drawn):
     drawn.scene.show(sight())
     before = np.array(drawn.camera.position)
-    road = Extent(200.0, 0.8, -0.8, -1.0, 4.0)
+    road = Extent(200.0, (0.0, -140.0, -1.0), (200.0, 140.0, 4.0))
     drawn.scene.show(replace(sight(), colouring=coloured(road)))
     stands = np.array(drawn.camera.position)
     assert np.linalg.norm(stands) > 5 * np.linalg.norm(before)
@@ -239,6 +242,43 @@ def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_move
     drawn.camera.position = moved = (1.0, 2.0, 3.0)
     drawn.scene.show(replace(sight(), colouring=coloured(replace(road, range_m=50.0))))
     assert drawn.camera.position == moved
+
+
+def test_a_view_of_another_shape_is_fitted_again_unless_the_user_has_moved_it(drawn):
+    drawn.scene.show(sight())
+    drawn.scene.look_from("above")
+    before, drawn.camera.image_width = drawn.camera.position, 400
+    drawn.moved[0](drawn.camera)
+    assert drawn.camera.position[2] > before[2]
+    drawn.camera.position, drawn.camera.image_width = (1.0, 2.0, 3.0), 1600
+    drawn.moved[0](drawn.camera)
+    assert drawn.camera.position == (1.0, 2.0, 3.0)
+
+
+def test_the_image_in_the_frustum_is_an_outline_where_it_would_hide_a_placement(drawn):
+    drawn.scene.show(replace(sight(), placements=(Placement(TimeNs(0), TimeNs(500), np.array([6.0, 0.0, 0.0]), 1.0),)))
+    frustum = drawn.node("/camera")
+    for viewer_m, data in (
+        ((-6.0, 0.0, 0.0), None),
+        ((-6.0, 0.0, 9.0), b"jpeg"),
+        ((-6.0, 0.0, 0.1), None),
+        ((9.0, 0.0, 0.0), b"jpeg"),
+    ):
+        drawn.camera.position = viewer_m
+        drawn.moved[0](drawn.camera)
+        assert frustum._image_data == data
+
+
+def test_axes_and_frustum_keep_their_size_on_the_screen(drawn):
+    drawn.scene.show(sight())
+    seen = []
+    for range_m in (10.0, 300.0):
+        drawn.scene.show(
+            replace(sight(), colouring=coloured(Extent(range_m, (0.0, -range_m, -1.0), (range_m, range_m, 1.0))))
+        )
+        distance_m = np.linalg.norm(np.subtract(drawn.camera.look_at, drawn.camera.position))
+        seen.append([drawn.node("/camera").scale / distance_m, drawn.node("/radar").axes_length / distance_m])
+    assert seen[0] == pytest.approx(seen[1])
 
 
 def test_a_placement_is_open_marked_or_dismissed():
