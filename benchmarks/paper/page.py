@@ -62,9 +62,8 @@ def page(measured: Measured, settings: Settings, fit: Fit) -> str:
     return f"""# The paper's experiments
 
 Written by `make paper`, measured on {measured.date}; do not edit. Everything is simulated: the authors' recordings are not published. Each row is a
-session of scans and clicks that went through the whole path: windows around the clicks, radar positions, pose. `tests/paper/test_experiments.py`
-shows for PPM, on 5 placements and images of 480 px, that recordings with images, read back from bags and solved by `cocalib solve`, give the same AED, and an
-independent script in `tests/paper/test_independent.py` computes AED, CDSD, PMM, CCM and the swaps from the paper's formulas alone.
+session of scans and clicks that went through windows, radar positions and pose. `tests/paper/test_experiments.py` shows that recordings with images give the
+same AED, `tests/paper/test_independent.py` computes the figures from the paper's formulas alone.
 
 PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting, CCM the checkerboard (both in
 `benchmarks/paper/rows.py`). T_m is the measured translation, T_c that of PPM. D1 is a rooftop, D2 a checkerboard with the reflector
@@ -72,58 +71,48 @@ on its corners, D3 an aisle with a larger reflector. DR+D3 is the same recording
 
 ## Table I
 
-Two sets of {len(measured.sets[0])} seeds, {_named(SEED_SETS[0])} and {_named(SEED_SETS[1])}, each seed another rig: median and the range that holds 90 % of seeds by the
-log-normal distribution fitted to them, the first set above the second. AED and CDSD in px. Seeds and range were fixed before these seeds were looked at.
+Two sets of {len(measured.sets[0])} seeds, {_named(SEED_SETS[0])} and {_named(SEED_SETS[1])}, each seed another rig: median and 90 % range of a log-normal fit [px], the first set above the
+second. Seeds and range were fixed before these seeds were looked at.
 
 {table(measured)}
 
-A figure is *reproduced* if the paper's value lies in our range and our median is within 25 % of it; *compatible* if it lies in our range, but that range is
-wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgment of {18 - len(differing(*measured.sets))} of 18 figures. The others:
+*Reproduced*: the paper's value lies in our range, our median within 25 % of it; *compatible*: that range is wider than a factor of 2; *order of magnitude*: wider
+than a factor of 10. The two sets give the same judgment of {18 - len(differing(*measured.sets))} of 18 figures. The others:
 
 {differ}
 
-PPM+D1, PPM+D2 and CCM+D2 were fitted, so that they agree is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn for each seed; that
-is why they are ranges. They rest on the size of the image too: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be
-{_with_focal_length(measured.sets, _SCRIPT_FOCAL_PX, settings)} without fitting again, and the judgment would turn to not reproduced.
-PPM+DR+D3 follows from gross errors that were chosen for it.
+PPM+D1, PPM+D2 and CCM+D2 were fitted: their agreement is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn per seed, and from the size of the
+image: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be {_with_focal_length(measured.sets, _SCRIPT_FOCAL_PX, settings)}, not reproduced.
+PPM+DR+D3 follows from gross errors chosen for it. The other three were not fitted, but are no blind predictions: `outshone_share` (PPM+D3) and the 40 placements (PPM+D1+T_m) were chosen after a first look,
+and CCM (CCM+D1) is read as twelve numbers without a rotation because only that gives figures like the paper's.
 
-The other three were not fitted, but none is a blind prediction. PPM+D3 depends on `outshone_share` (see below), which was chosen after a first look at D3.
-PPM+D1+T_m depends on the 40 placements, which were chosen after a first look too. CCM+D1 follows from reading CCM as twelve numbers without a rotation, because only
-that reading gives figures like the paper's. The seeds of the table were not looked at before all settings were final.
-
-CDSD of PPM+D3 is too small: distances of errors that are Gaussian, independent and the same in all directions have an AED of 1.91 times their
-CDSD. The paper's rows have 1.63 (PPM+D1), 1.35 (PPM+D3) and 2.65 (PPM+D2). The smaller ratios suggest rare large errors, the larger one an error that the points share; our simulation has
-neither.
+CDSD of PPM+D3 is too small: independent, isotropic Gaussian errors have an AED of 1.91 times their CDSD. The paper's rows have 1.63 (PPM+D1), 1.35 (PPM+D3) and 2.65
+(PPM+D2), which suggests rare large errors, or an error that the points share; our simulation has neither.
 
 ### CCM
-The camera knows where the corners of the board are, so CCM solves P_c = [R | t] P_r for twelve numbers by linear least squares; no rotation is taken. The
-condition number of that problem is {np.median(conditions[:, 0]):,.0f} (median). The corners lie in a plane, so the matrix maps all of space into that plane: its three by three part is singular
-but for rounding (condition number {conditions[:, 1].min():.0e} or more), however large the board is. The paper supposes another reason, that the board was too small and its
-data too dense. On the board that does not show: PPM's errors there are larger than CCM's,
+CCM solves P_c = [R | t] P_r for twelve numbers by linear least squares (condition number {np.median(conditions[:, 0]):,.0f}, median). The corners lie in a plane, so its three by three part is singular
+but for rounding (condition number {conditions[:, 1].min():.0e} or more) on a board of any size. The paper supposes a board too small and data too dense; on the board PPM's errors are larger than CCM's:
 {_ratio(seeds)}.
 On D1 CCM puts {_ninety(100 * outside, ".0f")} % of the points outside the image; in the paper all are. The ranges in this section hold the middle 90 %
 of all seeds.
 
 ### The other rig
-The paper says that several projected points are far off. What went wrong there it does not say; gross errors are our assumption: some radar positions are {settings.gross_m:g} m off,
-in a random horizontal direction. Medians over both sets, AED and CDSD over all pairs, the wrong ones included:
+Several projected points are far off in the paper, which does not say why. Assumed: some radar positions are {settings.gross_m:g} m off in a random horizontal direction. Medians over both sets, all pairs counted:
 
 {_gross_table(seeds)}
 
-The row of the table has {settings.gross_pairs} wrong pairs. The default method is solved on the same clicks. Its AED and CDSD count the
-wrong pairs too, and are large because its pose is not moved by them.
+The row of the table has {settings.gross_pairs} wrong pairs. The default method, on the same clicks, has large AED and CDSD because wrong pairs count and do not move its pose.
 
 ## The fit
 
-Three numbers were fitted, on PPM+D1, PPM+D2 and CCM+D2 alone: the standard deviations of the constant errors of azimuth and
-elevation, which a placement keeps as long as the reflector stands there, and the number of corners of the board that the reflector was put on.
-`python -m benchmarks.paper --fit` searches the grid of azimuth {_listed(AZIMUTHS_DEG)} deg, elevation {_listed(ELEVATIONS_DEG)} deg and {_listed(CORNERS)} corners on seeds {_named(FIT_SEEDS)}, which the
-table does not use, and writes `benchmarks/paper/fit.json`. The mismatch is the sum of squared logarithms of our AED and CDSD over the paper's. Seeds cannot tell
-the first places apart: on the two sets of the table, the best one has a mismatch of {" and ".join(f"{_mismatch(some):.3f}" for some in measured.sets)}. What the second one gives is in the table of other choices below. The best of {len(fit.places)} places:
+Three numbers were fitted on PPM+D1, PPM+D2 and CCM+D2: the standard deviations of constant azimuth and elevation errors of a placement, and the number of corners of the board used.
+`python -m benchmarks.paper --fit` searches azimuth {_listed(AZIMUTHS_DEG)} deg, elevation {_listed(ELEVATIONS_DEG)} deg and {_listed(CORNERS)} corners on seeds {_named(FIT_SEEDS)}, not used above
+(`benchmarks/paper/fit.json`). Mismatch: sum of squared logarithms of our AED and CDSD over the paper's. The first places cannot be told apart: on the two sets the best has
+{" and ".join(f"{_mismatch(some):.3f}" for some in measured.sets)}. The best of {len(fit.places)} places:
 
 {_fit_table(fit.places, ("azimuth [deg]", "elevation [deg]", "corners"))}
 
-With the best of them, 1 to {MOST_GROSS} wrong pairs and errors of {_listed(GROSS_M)} m were then tried for PPM+DR+D3. This is no fit of a setting, but the choice of an assumption for one row:
+With the best, 1 to {MOST_GROSS} wrong pairs and errors of {_listed(GROSS_M)} m were tried for PPM+DR+D3, which chooses an assumption for one row:
 
 {_fit_table(fit.gross, ("wrong pairs", "by [m]"))}
 
@@ -146,9 +135,7 @@ These are assumptions, the same for all rows:
 | RANSAC threshold | {PPM.paper.ransac_threshold_px:g} px | OpenCV's default; the paper prints none | PPM |
 | clicks | {settings.click_sigma_px:g} px, one per placement | the preset's | little |
 
-Azimuths are interpolated. There is nobody in the scene, and nothing echoes but the reflector, except in the aisle. What
-other choices give, median AED in px over the first {len(measured.others["nothing"])} seeds, without fitting again; compare with the first line, not with
-Table I:
+Nothing echoes but the reflector, except in the aisle. Other choices, median AED in px over the first {len(measured.others["nothing"])} seeds without fitting again (compare with the first line):
 
 {_others_table(measured.others)}
 
@@ -156,11 +143,8 @@ Here the fit's second place is elevation 0.2 deg and 20 corners.
 
 ## Moving people and cars
 
-PPM+D1's calibration, for the robot PPM+DR+D3's, judged by the boxes of what moves, with the same rig, on one minute each, by the rule of `cocalib
-evaluate`. The paper has an AWR1843 throughout; ours sees cars with an imaging radar, and what an AWR1843 changes is among the six assumptions below. The boxes are true. Which
-returns belong to a target is decided by the radar's own targets, as on a real recording, or by the simulation's labels. The paper's text does not say whether
-frames of 0 % count; the authors' published script drops them. If their figure comes from it, it compares with the first of our columns. Median and range over
-{len(cars)} seeds.
+PPM+D1's calibration (PPM+DR+D3's for the robot) on one minute each, by the rule of `cocalib evaluate`; cars with an imaging radar. Boxes are true; targets by the radar's own returns, or by the simulation's labels. The paper does not say whether frames of
+0 % count; the authors' published script drops them, which compares with our first column. Median and range over {len(cars)} seeds.
 
 {_acc_table(measured.accs)}
 
@@ -168,17 +152,11 @@ The paper's 66 % for cars is below ours. Six assumptions, one changed at a time,
 
 {_assumptions_table(measured.assumptions, cars)}
 
-Alone, a tight box or a longer range would bring Acc down to the paper's 66 % or below; which of them held there, the paper does not say, so its figure stays
-unexplained. Our boxes are true, the paper's come from a detector.
-
-Acc is not accuracy ([what it cannot see](evaluation.md#what-acc-cannot-see)).
+A tight box or a longer range alone would bring Acc to 66 % or below; the paper's boxes come from a detector. Acc is not accuracy ([what it cannot see](evaluation.md#what-acc-cannot-see)).
 
 ## Figures
 
-All panels of the paper's Figs. 2 to 6, simulated. Each image names its seed: of Figs. 2 to 4 the one whose AED and CDSD of the rows shown are nearest to the
-medians over both sets (sum of absolute logarithms; with the other rig, also how far its pose is off), of Figs. 5 and 6 the one of the {len(cars)} whose Acc by PPM
-and by PMM is nearest to theirs. Fig. 5 goes by labels and shows, of the frames with at least the median number of returns, the one whose shares of returns inside are nearest to Acc by
-both methods; (D) counts returns beyond 40 m. Fig. 6 goes by the radar's own targets.
+The paper's Figs. 2 to 6, simulated. Each names its seed: of Figs. 2 to 4 the one nearest to the medians, of Figs. 5 and 6 that of the {len(cars)} whose Acc is nearest to theirs. Fig. 5 goes by labels, (D) counts returns beyond 40 m; Fig. 6 by the radar's own targets.
 
 ![Fig. 2, simulated: D1 by PPM and by PMM](images/paper/fig-2.svg)
 

@@ -33,7 +33,7 @@ from tests.architecture.test_named_commands import command_lines
 from tests.port_client import channel, come_in, wanted
 from tests.served_process import ServedProcess
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]  # installing takes minutes on a busy machine
 
 
 _DIST = os.environ.get("COCALIB_DIST")
@@ -339,7 +339,6 @@ def prepare(folder: Path, run: Callable[[str], object]) -> None:
     (folder / "boxes.json").write_text(json.dumps(boxes))
 
 
-@pytest.mark.timeout(900)
 def test_the_command_lines_of_the_pages_run_from_the_wheel(installed, project_root, tmp_path):
     """In an empty folder with small simulated recordings, under the names that the pages give them."""
     others = [] if _DIST else sorted((project_root / "docs").glob("*.md"))  # they need the extras
