@@ -22,6 +22,7 @@ from calib_core.interchange.statement import (
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.interchange.syntax.zip_archives import pack
+from calib_core.interchange.trees.nuscenes import pose_of
 from calib_core.parsing import json_value
 
 _NOTES = (
@@ -132,9 +133,7 @@ def _value(content: Content, *, source: str) -> Any:
 
 
 def _posed(record: Mapping[str, Any], *, source: str) -> WrittenPose:
-    translation_m = floats(record.get("translation"), source=source, place="translation", length=3)
-    rotation = floats(record.get("rotation"), source=source, place="rotation", length=4)
-    pose = WrittenPose("quaternion_wxyz", np.array(rotation), np.array(translation_m), "radar_from_camera")
+    pose = pose_of(record, source=source)
     ImportedCalibration("nuscenes", pose).checked(source)
     return pose
 

@@ -11,6 +11,8 @@ from calib_core.interchange.format import Direction, looks_like_camera, looks_li
 Part = Literal["rotation", "translation", "other"]
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_INITIALS = {"c": "cam", "l": "lidar", "r": "radar"}
+_OF_INITIALS = re.compile("([rt])(cl|cr|lc|rc)", re.IGNORECASE)
 _JOINED = re.compile(r"(cam|camera|radar|to|from)(?=(?:cam|radar|to|from))", re.IGNORECASE)
 
 
@@ -79,7 +81,10 @@ class KeyHints:
 
 
 def words_of(key: object) -> tuple[str, ...]:
-    """Split a key into lower-case words: T_cam_radar, radarToCamera and radar2cam alike."""
+    """Split a key into lower-case words: T_cam_radar, radarToCamera and radar2cam alike, and rlc as r, lidar, to, cam."""
+    if initials := _OF_INITIALS.fullmatch(str(key)[:200]):
+        first, last = initials[2].lower()
+        return initials[1].lower(), _INITIALS[first], "to", _INITIALS[last]
     return tuple(word.lower() for word in _WORD.findall(_JOINED.sub(r"\1_", str(key)[:200])))
 
 
@@ -119,7 +124,7 @@ def hints_of(keys: Sequence[object], texts: Sequence[str] = ()) -> KeyHints:
     said = [word for one in (*keys, *texts) for word in words_of(one)]
     names_radar = any(map(looks_like_radar, said))
     names_both = names_radar and any(map(looks_like_camera, said))
-    lidar = next((str(key) for key in keys if looks_like_lidar(str(key))), "")
+    lidar = next((str(key) for key in keys if any(map(looks_like_lidar, (str(key), *words_of(key))))), "")
     other = "" if names_both else lidar or next((word for word in words if word in _OTHERS), "")
     return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit, names_radar, other)
 

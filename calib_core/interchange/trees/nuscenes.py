@@ -68,16 +68,23 @@ def read_nuscenes(poses: Content, source: str, sensors: Content | None) -> TreeP
 
 def _joint(record: Mapping[str, Any], channel: str, text: str, source: str) -> Joint:
     place = Place(source, _line_of(record, text))
-    translation, rotation = (
-        _numbers(record.get(key), length, f"{channel}: {key}", place)
-        for key, length in (("translation", 3), ("rotation", 4))
+    return Joint.posed(_EGO, channel, pose_of(record, source=str(place), place=f"{channel}: "), place)
+
+
+def pose_of(record: Mapping[str, Any], *, source: str, place: str = "") -> WrittenPose:
+    """Return the pose of a sensor in the ego frame: a translation, and a quaternion in the order w x y z or by names.
+
+    Raises:
+        InputError: a number is missing, or is none.
+    """
+    rotation = record.get("rotation")
+    wxyz = [rotation.get(key) for key in "wxyz"] if isinstance(rotation, Mapping) else rotation
+    return WrittenPose(
+        "quaternion_wxyz",
+        np.array(floats(wxyz, source=source, place=f"{place}rotation", length=4)),
+        np.array(floats(record.get("translation"), source=source, place=f"{place}translation", length=3)),
+        "radar_from_camera",
     )
-    written = WrittenPose("quaternion_wxyz", rotation, translation, "radar_from_camera")
-    return Joint.posed(_EGO, channel, written, place)
-
-
-def _numbers(value: Any, length: int, what: str, place: Place) -> np.ndarray:
-    return np.array(floats(value, source=str(place), place=what, length=length))
 
 
 def _line_of(record: Mapping[str, Any], text: str) -> int | None:

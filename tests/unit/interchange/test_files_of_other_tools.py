@@ -338,6 +338,9 @@ def test_nuscenes_says_which_of_two_unnamed_sensors_is_taken_for_the_radar():
     camera = pose | {"camera_intrinsic": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
     found = read_any(json.dumps([camera, {"translation": [0, 0, 0], "rotation": [1, 0, 0, 0], "camera_intrinsic": []}]))
     assert any("sensor without camera_intrinsic" in text for text in found.assumptions)
+    named = camera | {"rotation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}}
+    by_names = read_any(json.dumps([named, {"translation": [0, 0, 0], "rotation": [1, 0, 0, 0]}]))
+    np.testing.assert_array_equal(by_names.pose.rotation, found.pose.rotation)
 
 
 # COLMAP's camera models: each becomes the right lens, and no coefficient is lost.

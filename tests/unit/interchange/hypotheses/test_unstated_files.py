@@ -284,6 +284,17 @@ def test_the_pose_of_another_sensor_is_not_taken_for_the_radars():
         read_clear(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
 
 
+def test_parts_named_by_initials_are_a_lidars_and_its_camera_comes_along():
+    numbers = {"rlc": np.eye(3).tolist(), "tlc": [0.1, 0.2, -0.3]}
+    file = read_unstated(
+        json.dumps({"camera_matrix": [900, 0, 640, 0, 0, 900, 360, 0, 0, 0, 1, 0], **numbers}), "rig.json"
+    )
+    pose = file.pose_at(None)
+    assert (pose.hints.other, pose.readings[0].translation.tolist()) == ("rlc", [0.1, 0.2, -0.3])
+    assert clear_one(pose, hypotheses_of(pose)) is None
+    assert file.camera is not None
+
+
 def test_of_several_poses_the_only_one_that_names_a_radar_is_taken():
     text = json.dumps({"T_cam_lidar": np.eye(4).tolist(), "T_cam_radar": MATRIX.tolist()})
     found = read_clear(text, "rig.json")
