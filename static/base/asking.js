@@ -12,10 +12,18 @@ const LOST = "The server is not responding. Your clicks are safe: confirmed ones
 
 const ADMITTING = "The server was restarted and is letting this page in again. If that takes longer than a few seconds, open the link shown in the terminal.";
 
-/** Ask the server. @param {string} address @returns {Promise<Asked>} */
-export async function ask(address) {
+/** What is still being made is asked for again after this time [ms]. */
+const AGAIN_MS = 700;
+
+/** Ask the server. @param {string} address @param {(progress: string) => void} [tell] called while it makes the answer @returns {Promise<Asked>} */
+export async function ask(address, tell) {
   try {
     const answer = await fetch(address, { signal: AbortSignal.timeout(PATIENCE_MS) });
+    if (answer.status === 202) {
+      tell?.(await answer.text());
+      await new Promise((later) => setTimeout(later, AGAIN_MS));
+      return ask(address, tell);
+    }
     if (answer.ok) return { answer, reason: "", isLost: false };
     if (answer.status === 401) return { answer: null, reason: ADMITTING, isLost: true };
     const said = (await answer.text()).trim();
@@ -39,9 +47,9 @@ export const BROKE_OFF = "The server stopped before its answer was complete. You
 
 /** @typedef {{reason: string, isLost: boolean}} Unsaved why there is no file; `isLost` says that it is worth asking again. */
 
-/** Fetch a file and keep it under a name. @param {string} address @param {string} name @returns {Promise<Unsaved|null>} null if it was saved */
-export async function saveFile(address, name) {
-  const { answer, reason, isLost } = await ask(address);
+/** Fetch a file and keep it under a name. @param {string} address @param {string} name @param {(progress: string) => void} [tell] @returns {Promise<Unsaved|null>} null if it was saved */
+export async function saveFile(address, name, tell) {
+  const { answer, reason, isLost } = await ask(address, tell);
   const file = answer && (await content(answer.blob()));
   if (!file) return { reason: reason || BROKE_OFF, isLost: isLost || !reason };
   const url = URL.createObjectURL(file);

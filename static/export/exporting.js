@@ -17,8 +17,11 @@ import { drawFormats, focusFormats, formatColumn } from "./list.js";
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const REPORT = "report";
+const RERUN = "rerun";
 /** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
-const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
+const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html", [RERUN]: "api/view.rrd" };
+/** What is asked for to show it. @type {Record<string, string>} */
+const SHOWN = { [CLICKS]: PLAIN[CLICKS], [REPORT]: "api/preview/json", [RERUN]: "api/rerun.json" };
 const ASKING = "Asking the server for the file…";
 const page = /** @type {HTMLElement} */ (document.getElementById("page-deliver"));
 /** @type {Format[]} */
@@ -50,6 +53,7 @@ export function startExporting() {
   register(
     { id: "export", group: "File", words: "Export the calibration, the report or the clicks", keys: ["E"], also: "deliver tab save download write file json yaml urdf tf format", run: () => openExport(), when: withImages },
     { id: "report", group: "File", words: "Show the accuracy report", also: "html pdf print quality colleague", run: () => openExport(REPORT), when: withImages },
+    { id: "rerun", group: "File", words: "Open in Rerun", also: "rrd viewer show 3d window", run: () => openExport(RERUN), when: withImages },
     { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withImages },
   );
   try {
@@ -122,11 +126,14 @@ function build() {
   drawReason(ASKING);
 }
 
-/** The formats, and the clicks and the report as two of them. */
+/** The formats, and what else can be taken along as some of them. */
 function drawList() {
-  const clicks = { key: CLICKS, label: "Clicks, to continue elsewhere", group: "Go on", also: "clicks.json session", takes_parent: false, takes_rectified: false };
-  const report = { key: REPORT, label: "Report: how good, where, and why", group: "Go on", also: "report.html pdf print quality", takes_parent: false, takes_rectified: false };
-  drawFormats([...formats, clicks, report], kept.format);
+  const others = [
+    [CLICKS, "Clicks, to continue elsewhere", "clicks.json session"],
+    [REPORT, "Report: how good, where, and why", "report.html pdf print quality"],
+    [RERUN, "Rerun: images and returns over time", "view.rrd 3d show open"],
+  ].map(([key, label, also]) => ({ key, label, group: "Go on", also, takes_parent: false, takes_rectified: false }));
+  drawFormats([...formats, ...others], kept.format);
 }
 
 /** Ask the server for the text of the chosen format; only the newest answer is drawn. */
@@ -135,13 +142,14 @@ async function load() {
   const mine = ++asked;
   if (!formats.length) await loadFormats();
   const key = kept.format;
-  const { answer, reason, isLost } = await ask(key === CLICKS ? PLAIN[key] : key === REPORT ? "api/preview/json" : address("preview"));
+  const { answer, reason, isLost } = await ask(SHOWN[key] ?? address("preview"));
   const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
   if (mine !== asked) return;
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
   else if (key === CLICKS) drawClicks(said);
   else if (said.reason) drawReason(said.reason, false, key === REPORT ? null : said.field);
   else if (key === REPORT) drawReport();
+  else if (key === RERUN) drawRerun(said);
   else drawPreview(said);
 }
 
@@ -200,6 +208,18 @@ function drawReport() {
   for (const part of [before, notes, side]) part.replaceChildren();
 }
 
+/** Show how Rerun is opened. @param {{command: string, is_installed: boolean, opens_window: boolean}} offer */
+function drawRerun({ command, is_installed: isInstalled, opens_window: opensWindow }) {
+  head.replaceChildren(make("span", "", "Images, returns and pairs over time, in the Rerun viewer"));
+  drawFields({});
+  const install = "# rerun-sdk is not installed where cocalib runs\npip install 'cocalib[rerun]'\n";
+  const away = "# no window can be opened where cocalib runs: download the file, and on your computer\nrerun view.rrd\n";
+  const here = `# in a window, with the calibration as "json" saves it; or download the file\n${command}\n`;
+  show(isInstalled ? (opensWindow ? here : away) : install, "view.rrd", false);
+  save.disabled = !isInstalled;
+  for (const part of [before, notes, side]) part.replaceChildren();
+}
+
 /** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */
 function drawReason(reason, canRetry = false, field = null) {
   head.replaceChildren();
@@ -252,7 +272,10 @@ async function copyText() {
 async function download() {
   if (save.disabled) return;
   const name = fileName.value.trim() || String(fileName.dataset.suggested);
-  const unsaved = await saveFile(PLAIN[kept.format] ?? address("export"), name);
+  save.disabled = true;
+  const unsaved = await saveFile(PLAIN[kept.format] ?? address("export"), name, (progress) => (save.textContent = progress));
+  save.textContent = "Download";
+  save.disabled = false;
   if (unsaved) drawReason(unsaved.reason, unsaved.isLost);
 }
 

@@ -309,6 +309,18 @@ def test_which_returns_the_pose_is_for_is_chosen_and_the_file_follows(solved: Dr
     expect(solved.page.locator(f"{DIALOG} .returns")).to_be_hidden()
 
 
+def test_rerun_gets_a_command_to_copy_and_a_file_that_it_opens(solved: Driver, tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    solved.page.click("#tab-deliver")
+    solved.page.click(f'{DIALOG} [data-export="rerun"]')
+    solved.until(f"document.querySelector('{DIALOG} .name input').value === 'view.rrd'")
+    assert "rerun" in solved.page.inner_text(f"{DIALOG} .text") or "cocalib show" in solved.page.inner_text(
+        f"{DIALOG} .text"
+    )
+    assert solved.page.is_enabled(f"{DIALOG} .second:has-text('Copy')")
+    assert saved(solved, tmp_path).read_bytes()[:3] == b"RRF"
+
+
 def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
     solved.page.click("#tab-deliver")
     choose(solved, "tf2")

@@ -3,9 +3,13 @@
 import asyncio
 import gzip
 import http
+import os
 import posixpath
 import re
+import shlex
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from pathlib import Path
@@ -14,7 +18,8 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
-from calib_core.errors import CalibrationError
+from calib_core.errors import CalibrationError, InputError
+from calib_core.input_files import name_text
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.formats.registry import written_formats
 from calib_core.interchange.own.calibration_json import read_calibration
@@ -159,15 +164,19 @@ class Routes:
         if site is not None:
             pages = {name: partial(_file, path, policy=_SITE_POLICY) for name, path in _served(site).items()}
             self._files |= {f"/docs/{name}": make for name, make in {**pages, "": pages[_PAGE]}.items()}
+        self._downloads: _Downloads | None = None
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
     def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
         """Serve this recording from now on."""
-        self._made = _Downloads(workspace, recording, hub).by_path()
+        self._downloads = _Downloads(workspace, recording, hub)
+        self._made = self._downloads.by_path()
 
     def withdraw(self) -> None:
         """Serve no recording until another one is admitted."""
         self._made = None
+        if self._downloads is not None:
+            self._downloads.end()
 
     async def answer(self, address: str) -> Reply:
         """Answer a GET; files and exports are produced outside the event loop.
@@ -193,6 +202,11 @@ class _Downloads:
         self._workspace = workspace
         self._recording = recording
         self._hub = hub
+        self._view_file = _ViewFile(recording)
+
+    def end(self) -> None:
+        """Write nothing more in the background."""
+        self._view_file.end()
 
     def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
         """Return the function for each path; each takes the query."""
@@ -201,6 +215,8 @@ class _Downloads:
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
             "/api/report.html": self._report,
+            "/api/rerun.json": self._rerun,
+            "/api/view.rrd": lambda _query: self._of_calibration(self._view_file.answer),
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
             "/api/camera.yaml": self._camera,
@@ -227,6 +243,25 @@ class _Downloads:
                 if query == "shown=1"
                 else _download(report, "report.html")
             )
+
+        return self._of_calibration(make)
+
+    def _rerun(self, _query: str) -> Reply:
+        """Say how the recording with its calibration is opened in Rerun on this machine."""
+        from cocalib.rerun import require_display, require_sdk
+
+        def can(require: Callable[[], None]) -> bool:
+            try:
+                require()
+            except InputError:
+                return False
+            return True
+
+        def make(_text: str) -> Reply:
+            paths = shlex.join(name_text(str(path.absolute())) for path in self._recording.paths)
+            command = f"cocalib show {paths} --calibration calibration.json"
+            offer = RerunOffer(command, can(require_sdk), can(partial(require_display, os.environ)))
+            return _reply(msgspec.json.encode(offer), _TYPES[".json"])
 
         return self._of_calibration(make)
 
@@ -323,6 +358,73 @@ class _Downloads:
 
     def _image_changes(self, _query: str) -> Reply:
         return _reply(msgspec.json.encode(self._hub.image_changes), _TYPES[".json"])
+
+
+@dataclass(frozen=True, slots=True)
+class RerunOffer:
+    """How a recording with its calibration is opened in Rerun.
+
+    Attributes:
+        command: opens a window, with the calibration as it is downloaded.
+        is_installed: whether rerun-sdk is.
+        opens_window: whether this machine has a display.
+    """
+
+    command: str
+    is_installed: bool
+    opens_window: bool
+
+
+_MOST_VIEW_BYTES = 500_000_000
+
+
+class _ViewFile:
+    """The recording with its calibration as an .rrd file: written in a thread while whoever wants it asks again and again."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rerun")
+        self._job: tuple[str, Future[bytes]] | None = None
+        self._progress, self._ended = "The recording is being read", False
+
+    def answer(self, text: str) -> Reply:
+        """Return the file for a calibration once it is written; until then, a 202 with how far it is.
+
+        Raises:
+            InputError: rerun-sdk is missing, or the file is too large for a page.
+            RecordingError: the recording cannot be read.
+        """
+        job = self._job
+        if job is None or job[0] != text:
+            job = self._job = (text, self._thread.submit(self._write, text))
+        if not job[1].done():
+            return _reply(self._progress.encode(), _TYPES[".txt"], status=202)
+        self._job = None
+        return _download(job[1].result(), "view.rrd")
+
+    def end(self) -> None:
+        """Stop writing with the next frame."""
+        self._ended = True
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+    def _write(self, text: str) -> bytes:
+        from cocalib.recorded_view import recorded_view
+        from cocalib.rerun import write_view
+
+        def progress(done: int, total: int) -> None:
+            self._progress = f"{done} of {total} frames are written"
+            if self._ended:
+                raise InputError("the recording was closed while the file was written")
+
+        with tempfile.TemporaryDirectory(prefix="cocalib-") as folder:
+            path = Path(folder) / "view.rrd"
+            write_view(recorded_view(self._recording, _file_of(text).calibration, "range"), path, progress=progress)
+            if path.stat().st_size > _MOST_VIEW_BYTES:
+                size = f"{path.stat().st_size / 1e6:.0f} MB"
+                raise InputError(
+                    f"the file has {size}, too large for a page; add --out view.rrd to the command and copy it"
+                )
+            return path.read_bytes()
 
 
 def _served(folder: Path) -> dict[str, Path]:

@@ -235,7 +235,7 @@ class TabScene:
 
     def _show_image(self) -> None:
         """Show the image in the frustum, or its outline alone where it would hide a placement from the viewer."""
-        size = self._frustum.scale * np.array(self._frustum.compute_canonical_frustum_size())
+        size = np.multiply(self._frustum.scale, self._frustum.compute_canonical_frustum_size())
         viewer = self._camera_from_radar @ np.array(self._client.camera.position)
         data = (
             None

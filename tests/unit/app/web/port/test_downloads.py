@@ -3,6 +3,7 @@
 import asyncio
 import dataclasses
 import json
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -71,6 +72,52 @@ def test_a_missing_calibration_is_explained(ask):
     for path in ("/api/calibration.json", "/api/export/urdf"):
         assert ask(Session(), path).status == 409
         assert b"four placements" in ask(Session(), path).body
+
+
+def test_rerun_is_offered_as_a_command_where_it_is_installed_and_has_a_window(file, ask, monkeypatch):
+    solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    for installed, display in ((True, ":1"), (True, ""), (False, "")):
+        monkeypatch.setattr("cocalib.rerun.sdk.find_spec", lambda _name, found=installed: object() if found else None)
+        monkeypatch.setattr("sys.platform", "linux")
+        monkeypatch.setenv("DISPLAY", display)
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        offer = json.loads(ask(solved, "/api/rerun.json").body)
+        assert (offer["is_installed"], offer["opens_window"]) == (installed, bool(display))
+        assert offer["command"].startswith("cocalib show ")
+    assert ask(Session(), "/api/rerun.json").status == 409
+    assert ask(Session(), "/api/view.rrd").status == 409
+
+
+def test_the_file_for_rerun_is_written_in_the_background_and_asked_for_until_it_is_there(
+    file, project_root, monkeypatch
+):
+    goes_on, halfway = threading.Event(), threading.Event()
+
+    def write(_view: object, path: Path, *, progress: Callable[[int, int], None]) -> None:
+        progress(3, 7)
+        halfway.set()
+        assert goes_on.wait(30)
+        path.write_bytes(b"RRF2")
+
+    monkeypatch.setattr("cocalib.rerun.write_view", write)
+    monkeypatch.setattr("cocalib.recorded_view.recorded_view", lambda *_given: None)
+    session = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    routes = Routes(project_root / "static")
+    workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive"), camera_file=None)
+    hub: Any = SimpleNamespace(survey=None)
+    routes.admit(workspace, ImageRecording(grey_images(1)), hub)
+
+    def ask_for_it() -> Reply:
+        return asyncio.run(routes.answer("/api/view.rrd"))
+
+    assert ask_for_it().status == 202
+    assert halfway.wait(30)
+    assert b"3 of 7" in ask_for_it().body
+    goes_on.set()
+    while (reply := ask_for_it()).status == 202:
+        pass
+    assert reply.body == b"RRF2"
+    routes.withdraw()
 
 
 @pytest.mark.parametrize("name", [form.name for form in FORMATS])
