@@ -3,12 +3,12 @@ PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
-# Files in their order: the slow ones (accuracy, browser) first, so that no worker is left with one at the end.
+# Files in their order: the slow ones (browser) first, so that no worker is left with one at the end.
 PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,association diagnostics estimation interchange results)
 
-.PHONY: help env dev demo docs dist test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample image clean
+.PHONY: help env dev demo docs dist test test-all fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample image clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -58,7 +58,11 @@ check: dev  ## Check style, types, layers, frame names, spelling.
 	@$(BIN)/python .ci/structure.py grown
 	@$(BIN)/python .ci/installed_size
 
-test: dev  ## Run all tests, including those in the browser; those of the architecture belong to make check.
+test: dev  ## Run the tests, including those in the browser, but for the slow ones; those of the architecture belong to make check.
+	@$(BIN)/python tests/find_browser.py --install
+	$(BIN)/pytest $(PARALLEL) -m "not slow" --ignore tests/architecture --ignore tests/accuracy
+
+test-all: dev  ## Run the slow ones too, and tests/accuracy, which solves many simulated sets: before a release, and every week.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/pytest $(PARALLEL) --ignore tests/architecture
 

@@ -23,6 +23,7 @@ def page(open_page: Callable[..., Driver], server: RunningServer) -> Driver:
     return open_page(server.url, reduced_motion="reduce")
 
 
+@pytest.mark.slow
 @pytest.mark.no_3d_view
 def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) -> None:
     found: dict[str, list[str]] = {}

@@ -44,6 +44,7 @@ def give(page: Driver, name: str, text: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_calibration_is_judged_by_boxes_of_a_file_and_around_what_moves(
     open_page: Callable[..., Driver], street_server: RunningServer, walk: StreetRecording
 ) -> None:

@@ -87,6 +87,7 @@ def test_without_intrinsics_one_can_click_and_a_dropped_camera_file_gives_the_po
     page.forget_lost_connections()
 
 
+@pytest.mark.slow
 def test_a_recording_is_found_below_the_root_and_its_other_radar_is_chosen(
     recordings: Path, serve: Callable[..., ServedProcess], open_page: Callable[..., Driver]
 ) -> None:

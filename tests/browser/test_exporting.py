@@ -241,6 +241,7 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
+@pytest.mark.slow
 def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_declared_rectified_for_good(
     solved: Driver, tmp_path: Path
 ) -> None:
@@ -353,6 +354,7 @@ def test_a_contradictory_calibration_is_saved_only_after_a_tick(page: Driver, tr
     assert "verdict: contradictory" in saved(page, tmp_path).read_text()
 
 
+@pytest.mark.slow
 def test_the_panel_fits_the_screen(solved: Driver) -> None:
     for width, height in ((1280, 720), (390, 844)):
         solved.page.set_viewport_size({"width": width, "height": height})

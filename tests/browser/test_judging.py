@@ -35,6 +35,7 @@ def in_sight(page: Driver) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown && __cocalib.state.view.verdict.key === 'N'")
     assert page.text("#verdict") == "No clicks yet"
@@ -190,6 +191,7 @@ def mark(ear: Ear, truth: Any) -> None:
     ear.press("x")
 
 
+@pytest.mark.slow
 def test_no_sentence_is_said_twice_and_the_first_screen_has_few_words(
     open_page: Callable[..., Driver], server: RunningServer, truth: Any
 ) -> None:

@@ -85,6 +85,7 @@ def shade_at(page: Driver, u: float, v: float, canvas: str = "image") -> np.ndar
     )
 
 
+@pytest.mark.slow
 def test_a_lens_is_calibrated_on_the_page_and_the_clicks_give_a_pose(
     gate: threading.Event, waved: tuple[RunningServer, Workspace], folder: Path, open_page: Callable[..., Driver]
 ) -> None:

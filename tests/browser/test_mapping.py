@@ -44,6 +44,7 @@ def drawn_at(page: Driver, u: float, v: float, ratio: float) -> tuple[float, flo
     ) / ratio
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1, 1.25, 2])
 def test_a_click_on_what_is_drawn_comes_back_within_a_tenth_of_a_pixel(
     open_page: Callable[..., Driver], launch: Callable[..., Browser], dots: RunningServer, ratio: float

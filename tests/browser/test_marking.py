@@ -25,6 +25,7 @@ def answer(page: Driver) -> Any:
     return {key: view[key] for key in keys} | ({"verdict": view["verdict"]} if "verdict" in view else {})
 
 
+@pytest.mark.slow
 def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 4)

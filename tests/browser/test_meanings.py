@@ -42,6 +42,7 @@ def server(project_root: Path, extrinsic: Path, tmp_path: Path) -> Iterator[Serv
         yield running
 
 
+@pytest.mark.slow
 def test_the_meaning_that_is_picked_is_shown_as_the_calibration_named_as_such_and_can_be_changed(
     server: ServedProcess, open_page: Callable[..., Driver]
 ) -> None:

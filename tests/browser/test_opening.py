@@ -51,6 +51,7 @@ def shade_at(page: Driver, u: float, v: float) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 def test_the_first_image_is_there_and_nothing_can_be_done_to_it_until_the_recording_is(
     sample: Recording, workspace: Workspace, open_early: Callable[[RunningServer], Driver]
 ) -> None:

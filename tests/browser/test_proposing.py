@@ -120,6 +120,7 @@ def off_px(page: Driver, images: Images) -> float:
     return float(np.hypot(offer["place"]["pixel_px"][0] - u_px, offer["place"]["pixel_px"][1] - v_px))
 
 
+@pytest.mark.slow
 def test_twenty_placements_take_at_most_25_keys_and_clicks(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:

@@ -21,6 +21,7 @@ def _pages(pdf: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b(?!s)", pdf))
 
 
+@pytest.mark.slow
 def test_it_prints_to_four_pages_at_most_and_fits_a_telephone_without_a_word_from_elsewhere(
     chromium: Browser, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -49,6 +49,7 @@ def image_in(page: Page) -> tuple[np.ndarray, tuple[int, int, int, int]]:
     return shown, tuple(largest[:4])
 
 
+@pytest.mark.slow
 def test_the_viewer_draws_the_image_with_its_returns_and_asks_nobody_else(
     served: tuple[str, np.ndarray, tuple[int, int, int]], launch: Callable[..., Browser]
 ) -> None:

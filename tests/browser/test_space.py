@@ -88,6 +88,7 @@ def look_from(page: Driver, viewpoint: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_viser_still_has_the_private_parts_that_labels_and_picking_use(solved: Driver) -> None:
     missing = solved.page.evaluate(
         """async () => {
@@ -205,6 +206,7 @@ IMAGE_DIFFERENCE = """([left, top, scale]) => {
 }"""
 
 
+@pytest.mark.slow
 def test_without_images_returns_and_placements_can_be_picked_too(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
@@ -220,6 +222,7 @@ def test_without_images_returns_and_placements_can_be_picked_too(
     page.until("__cocalib.state.cursor > 0 && __cocalibSpace.frameShown() === __cocalib.state.cursor")
 
 
+@pytest.mark.slow
 def test_the_3d_view_shows_the_scene_and_says_before_a_pose_why_there_are_no_returns(page: Driver) -> None:
     scene_without_visers_own_panels(page)
     keys_while_it_has_the_focus(page)

@@ -28,6 +28,7 @@ def demo(tmp_path: Path) -> Iterator[Callable[[], ServedProcess]]:
         yield lambda: stack.enter_context(served_process(*session, state=tmp_path, command="demo", port=port))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9 needs POSIX")
 def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
     demo: Callable[[], ServedProcess], open_page: Callable[..., Driver], truth: Any
@@ -75,6 +76,7 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
         assert page.page.locator("img").count() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.no_3d_view
 def test_large_frames_play_at_half_size_and_stand_at_full_size(
     open_page: Callable[..., Driver], tmp_path: Path

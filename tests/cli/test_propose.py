@@ -161,6 +161,7 @@ def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(cocalib, record
     assert f"{solved.clicks}: 11 of its clicks" in answer.err
 
 
+@pytest.mark.slow
 def test_the_sample_is_solved_without_a_person(cocalib, project_root, tmp_path):
     sample, out = project_root / "sample_data" / "rooftop", tmp_path / "pose.json"
     answer = cocalib("solve", sample / "radar.bag", sample / "camera.bag", "--auto", "--out", out)

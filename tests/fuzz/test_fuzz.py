@@ -15,6 +15,7 @@ from tests.fuzz.targets import TARGETS
 ROUNDS = 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
 def test_nothing_but_clear_errors_comes_of_a_changed_input(target, tmp_path):
     seeds = len(target.seeds(_new(tmp_path / "counted")))

@@ -14,6 +14,7 @@ ALIASES = "a0: &a0 [1, 1]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" f
 DIGITS = "9" * 101
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parse", [yaml_documents, yaml_nodes])
 @pytest.mark.parametrize(
     ("text", "reason"),

@@ -58,6 +58,7 @@ def slopes(calibration: Calibration) -> list[Facts]:
     return [one.facts for one in calibration.warnings if "quantity" in one.facts]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [CalibrationOptions(), CalibrationOptions(solving=POSITION)])
 @pytest.mark.parametrize("angle", ["azimuth", "elevation"])
 @pytest.mark.parametrize("slope_deg", [-0.4, 0.4])
@@ -82,6 +83,7 @@ def test_angles_that_change_with_the_range_are_reported_with_amount_and_sign(slo
         assert slopes(calibrate_pairs(simulated.pairs, simulated.camera).unwrap()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, MEASURED, CalibrationOptions(), CalibrationOptions(solving=POSITION)])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_right_intrinsics_are_not_suspected(noise, options):
@@ -115,6 +117,7 @@ def causes(pairs: Sequence[Pair], simulated: SimulatedPairs) -> list[tuple[str, 
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "cause"),
     [

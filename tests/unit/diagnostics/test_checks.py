@@ -64,12 +64,14 @@ def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions)
     return outcome.warnings
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_of_twelve_good_sets_with_a_tape_measure_at_most_one_has_a_warning(noise):
     sets = [simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise) for seed in range(12)]
     assert sum(bool(codes(simulated.pairs, simulated.camera, measured())) for simulated in sets) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [(1, -1, 1), (1, 1, -1)])
 @pytest.mark.parametrize("sigma_m", [0.01, 0.3])
 def test_mirrored_axes_are_caught_whenever_the_camera_position_is_known(axes, sigma_m):
@@ -255,6 +257,7 @@ def test_a_second_near_placement_takes_the_decision_from_the_first(noise):
     assert "one-pair-decides" not in {one.code for one in outcome.warnings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_no_pair_of_a_good_set_decides(noise):
     for seed in range(8):
@@ -418,6 +421,7 @@ def clocks_apart(warnings: Sequence[DataWarning]) -> list[DataWarning]:
     return [one for one in warnings if one.code == "clocks-apart"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [9.5, -9.5])
 def test_stamps_that_are_a_placement_off_are_found(rooftop, ahead_s):
     clicks, scans, camera = rooftop
@@ -428,6 +432,7 @@ def test_stamps_that_are_a_placement_off_are_found(rooftop, ahead_s):
     assert warning_remark(warning).action == SetOption("clock", "receive")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [37.0, -37.0, 18.0, -18.0])
 def test_clocks_of_two_time_scales_are_named_with_the_seconds(rooftop, ahead_s):
     clicks, scans, camera = rooftop

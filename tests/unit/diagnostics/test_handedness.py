@@ -38,6 +38,7 @@ def handedness(pairs: Sequence[Pair], simulated: SimulatedPairs, options: Calibr
     return {one.code for one in outcome.warnings} & HANDEDNESS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 @pytest.mark.parametrize(("offset_m", "distance_m"), [((0.0, 0.0, 0.045), 1.0), ((-3.0, 7.4, 1.0), 8.0)])
 def test_the_side_of_the_ground_tells_mirrored_axes_from_right_ones(noise, offset_m, distance_m):

@@ -135,6 +135,7 @@ def drawn() -> tuple[Drawn, ...]:
     return tuple(Drawn.of(seed) for seed in range(8))
 
 
+@pytest.mark.slow
 def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn):
     bias_m, *scales = (
         _STEP * sigma for sigma in (_RADAR.range_bias_sigma_m, _RADAR.azimuth_scale_sigma, _RADAR.elevation_scale_sigma)
@@ -148,6 +149,7 @@ def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn)
     np.testing.assert_allclose(sum(diagonal(one, "systematic") for one in drawn), expected, rtol=0.2)
 
 
+@pytest.mark.slow
 def test_the_part_of_the_tape_is_what_another_reading_moves_the_pose_by(drawn):
     readings = (
         _STEP * np.sqrt(2.0) * _SIGMA_M * np.eye(3)

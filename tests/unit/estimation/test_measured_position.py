@@ -38,6 +38,7 @@ def codes(answer: Calibration) -> set[str]:
     return {warning.code for warning in answer.warnings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip_m", [(0.0, 0.0, 0.05), (0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0)])
 def test_a_position_a_few_centimetres_off_is_within_the_stated_error_or_contradicted(
     slip_m,
@@ -49,6 +50,7 @@ def test_a_position_a_few_centimetres_off_is_within_the_stated_error_or_contradi
         assert inside or (any(slip_m) and codes(answer) & NAMED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip_m", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, -0.3)])
 def test_a_contradicted_position_is_named_and_has_hardly_any_weight(slip_m):
     for seed in range(4):
@@ -61,6 +63,7 @@ def test_a_contradicted_position_is_named_and_has_hardly_any_weight(slip_m):
             assert part[:3].max() < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [6, 20])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_a_position_metres_off_is_named_and_the_pose_is_that_of_the_pairs_alone(noise, count):
@@ -85,6 +88,7 @@ def step(before: Calibration, after: Calibration) -> float:
     return float(np.sqrt(error @ np.linalg.solve(before.covariance, error)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("direction", "sigma_m"), [((1.0, 0.0, 0.0), 0.03), ((0.0, -0.6, 0.8), 0.01)])
 def test_pose_and_covariance_follow_a_position_that_is_farther_and_farther_off(
     direction: tuple[float, float, float], sigma_m: float
@@ -98,6 +102,7 @@ def test_pose_and_covariance_follow_a_position_that_is_farther_and_farther_off(
     assert max(abs(np.log(b / a)) for a, b in pairwise(sizes)) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_sides(noise):
     simulated = simulate_pairs(12, rng=np.random.default_rng([2035, 0]), noise=noise)

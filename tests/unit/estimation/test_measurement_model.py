@@ -169,6 +169,7 @@ def solved(seed: int, height_m: float, options: CalibrationOptions) -> tuple[Cal
     return outcome, simulated.camera_from_radar
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, MEASURED])
 @pytest.mark.parametrize("height_m", [0.025, 1.2])
 def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_the_radars_height(height_m, options):
@@ -266,6 +267,7 @@ def test_scipy_finds_the_same_optimum_over_pose_and_true_positions():
     assert np.linalg.norm(apart[:3]) < 2e-4
 
 
+@pytest.mark.slow
 def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs():
     """PnP on noisy points is biased by centimetres however many pairs there are; errors in variables is not."""
     crowded = replace(FIELD, separation_m=0.0)

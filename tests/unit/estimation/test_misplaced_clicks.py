@@ -86,6 +86,7 @@ def test_a_misplaced_click_far_away_does_not_change_the_noise_level(rooftop):
     assert solved_with(rooftop, "c11", dv_px=-60.0).noise_scale == pytest.approx(without.noise_scale, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_click_that_is_dragged_away_is_set_aside_without_a_jump():
     """Twelve pairs of an imaging radar: the nearest click, which the pose leans on, moves by 3 px at a time."""
     for seed, tape in ((0, False), (2, True)):

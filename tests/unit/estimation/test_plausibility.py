@@ -48,6 +48,7 @@ def found_in(
     return {one.code: one.facts for one in outcome.warnings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["default", "paper"])
 @pytest.mark.parametrize(
     ("change", "code", "facts"),

@@ -90,6 +90,7 @@ def test_which_of_the_two_is_the_first_changes_nothing():
     np.testing.assert_allclose(one.noticeable(0.05), other.noticeable(0.05), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_distance_of_unchanged_sessions_is_that_of_six_degrees_of_freedom():
     squared = [change_of(*sessions(seed, noise="ti")).squared for seed in range(10, 22)]
 

@@ -33,6 +33,7 @@ def refined(case: WrongLens = TOLD) -> Calibration:
     return solved(simulated.pairs, given, case.options)
 
 
+@pytest.mark.slow
 def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_told():
     trials = [measure_wrong_lens(TOLD, trial) for trial in range(10)]
     errors = np.array([one["focal"] for one in trials], dtype=np.float64)
@@ -53,6 +54,7 @@ def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says
     assert warning_remark(warning).action == CalibrateLens()
 
 
+@pytest.mark.slow
 def test_refining_with_a_true_covariance_does_not_make_the_pose_worse():
     given, better = (
         [measure_wrong_lens(WrongLens("covariance", refined=one), trial) for trial in range(5)] for one in (False, True)

@@ -193,6 +193,7 @@ def test_which_returns_count_and_their_boxes_do_not_depend_on_the_calibration(cr
     assert figures[3].acc == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("angle_deg", [-10.0, 10.0])
 def test_a_calibration_turned_by_ten_degrees_scores_near_chance(crowd, axis, angle_deg):
@@ -240,6 +241,7 @@ def keyframes(boxes: Boxes, step: int = 20) -> Boxes:
     return dataclasses.replace(boxes, frames=boxes.frames[::step])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_returns_in_cuboids_give_about_what_the_truth_gives_on_keyframes(seed):
     scene = street(people=3, seconds=60.0, seed=seed, with_names=True, with_cuboids=True)
@@ -252,6 +254,7 @@ def test_returns_in_cuboids_give_about_what_the_truth_gives_on_keyframes(seed):
     assert judged_by_boxes(turned(TRUE_POSE, 1, 10.0), CAMERA, by_cuboid).acc < 0.1
 
 
+@pytest.mark.slow
 def test_cuboids_of_another_recording_give_no_figure():
     scene, other = (street(people=3, seconds=60.0, seed=seed, with_cuboids=True) for seed in (1, 7))
     counted = counted_returns(CAMERA, scene.scans, keyframes(other.boxes), None)
@@ -277,6 +280,7 @@ def test_groups_are_counted_by_the_frames_alone():
     assert counts == {7}, "of 10 s, in 67 s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "deg"), [("yaw", 5.0), ("yaw", -9.0), ("pitch", 2.5), ("pitch", -6.0), ("roll", 6.0), ("yaw", 0.0)]
 )

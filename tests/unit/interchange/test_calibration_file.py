@@ -432,6 +432,7 @@ def test_an_export_says_what_the_pose_for_the_other_radar_data_would_change(scal
     assert read_any(again.data).for_raw == (other.is_for == "raw")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", POSED, ids=[known.name for known in POSED])
 def test_a_pose_for_raw_data_says_so_in_its_file_and_check_knows_it(scaled, known):
     raw = for_raw(scaled)

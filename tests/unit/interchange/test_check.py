@@ -174,6 +174,7 @@ def test_two_calibrations_are_compared_in_degrees_centimetres_and_pixels(file):
     assert aside.change.squared == pytest.approx(0.1**2 * np.linalg.inv(2 * file.calibration.covariance)[0, 0])
 
 
+@pytest.mark.slow
 def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
     rng = np.random.default_rng(4)
     calibration = file.calibration

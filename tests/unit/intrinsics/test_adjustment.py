@@ -159,6 +159,7 @@ def fitted(seed: int, errors: Errors, count: int = 12) -> tuple[Camera, SharedCo
     return state.camera, shared_covariance(reduced(linearize(state, stack, FREEDOM)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("errors", [Errors(), Errors(0.05, shared_px=0.1), Errors(motion_px_per_s=60.0)])
 def test_the_stated_sigma_covers_the_truth(errors):
     inside = []
@@ -222,6 +223,7 @@ def test_motion_under_a_rolling_shutter_is_told_from_noise():
 # The lens model that is chosen is the one the views were made with, unless a simpler one predicts as well.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", CAMERAS)
 def test_the_true_model_is_chosen_with_a_reason(model):
     lens = calibrate_lens(search_of(drawn_views(CAMERAS[model], 16, 5)))
@@ -251,6 +253,7 @@ def planted(view: BoardCorners, pixels_px: np.ndarray, name: str, blur_px: float
 GOOD = drawn_views(CAMERAS["plumb_bob"], 12, 11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "errors", [Errors(), Errors(0.05, shared_px=0.1), Errors(motion_px_per_s=60.0), Errors(noise_px=0.0)]
 )

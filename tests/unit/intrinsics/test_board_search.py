@@ -166,6 +166,7 @@ def test_a_long_recording_is_searched_where_the_board_is(monkeypatch):
     assert not any("as a whole" in one.reason for one in search.left_out)
 
 
+@pytest.mark.slow
 def test_a_search_for_a_board_that_is_another_one_ends_early():
     other = Board("checkerboard", 6, 4, 0.03)
     images = Drawn([lambda: drawn(board=other)] * 100)
@@ -219,6 +220,7 @@ def apart(found: np.ndarray, true: np.ndarray) -> np.ndarray:
     return min((found - true, found - true[::-1]), key=lambda difference: float(np.abs(difference).sum()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(model):
     errors = []
@@ -306,6 +308,7 @@ def test_a_large_image_is_searched_small_and_refined_large():
     assert np.abs(apart(found[1], true_corners(CHECKERBOARD, camera, pose, FILM))).max() < 0.15
 
 
+@pytest.mark.slow
 def test_a_part_of_a_larger_board_is_not_the_board():
     image, _ = next(views(CHECKERBOARD, FILM, 1))
     for columns, rows in ((8, 6), (10, 7)):

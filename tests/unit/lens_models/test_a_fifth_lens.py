@@ -137,6 +137,7 @@ def test_files_and_formats_that_have_a_name_for_it_store_it(camera, file):
     assert (imported.camera.model, imported.camera.distortion.tolist()) == ("division", [-0.2])
 
 
+@pytest.mark.slow
 def test_a_recording_needs_a_name_for_it_in_camera_info(camera, tmp_path, monkeypatch):
     options = SimulationOptions(camera_model="division", placements=1, width_px=160, height_px=90)
     data = write_recording(simulate(options), tmp_path / "named")

@@ -239,6 +239,7 @@ def test_the_look_is_found_at_every_range_and_below_a_pixel(views):
         assert all(other.likeness < best.likeness for other in view.candidates[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thought_m", [0.08, 0.24, 0.6])
 def test_a_click_shows_how_wide_the_reflector_is(thought_m):
     seen = dwell_views(placements_of(LOOKED_AT.dwells), LOOKED_AT, CAMERA, reflector_m=thought_m)

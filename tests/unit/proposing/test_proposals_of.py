@@ -336,6 +336,7 @@ def _with_upright_thing(view: DwellView, pixel_px: np.ndarray) -> DwellView:
     return replace(view, width_px=30.0, factor=8.0, change=change)
 
 
+@pytest.mark.slow
 def test_the_width_is_found_far_beyond_chance_where_images_and_radar_belong_together():
     few = Drawing(count=6)
     own = common_width(draw_views(4, few).views, CAMERA, OPTIONS)

@@ -41,6 +41,7 @@ def test_a_sound_file_is_read_whole(kind, tmp_path):
     assert "result    sound" in verification_text(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_file_that_lost_a_message_is_called_sound(kind, tmp_path):
     file = sound(kind, tmp_path)

@@ -120,6 +120,7 @@ def test_sound_sets_give_neither_warning(noise, options):
         assert not named & {one.code for one in outcome.warnings}
 
 
+@pytest.mark.slow
 def test_returns_from_behind_the_reflector_are_beyond_the_range_bias_that_is_assumed():
     """As a camera beside the radar sees them; one in its place sees them where the reflector is, whatever their range."""
     beside, found = RigOptions(camera_offset_m=(0.0, 2.0, 0.5)), []

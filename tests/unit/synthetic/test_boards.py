@@ -176,6 +176,7 @@ def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_image():
     assert np.ptp([pose.rotation[0, 2] for pose in poses]) > 0.8
 
 
+@pytest.mark.slow
 def test_a_board_that_does_not_fit_is_refused():
     flat = typical_camera(width_px=2000, height_px=64)
     with pytest.raises(OptionError, match="0 of 2 poses"):

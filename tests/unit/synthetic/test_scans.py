@@ -191,6 +191,7 @@ def test_only_the_corners_that_the_camera_sees_can_be_asked_for():
         simulate(narrow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["paper-d1", "paper-d2", "paper-d3"])
 def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_does(preset):
     options = replace(PRESETS[preset], placements=4, dwell_s=4.0, radar_rate_hz=4.0)

@@ -94,6 +94,7 @@ def test_every_reflector_is_in_the_image_and_apart_from_the_others():
     assert gaps[~np.eye(40, dtype=bool)].min() >= AISLE.separation_m
 
 
+@pytest.mark.slow
 def test_more_placements_than_fit_are_refused_with_the_number_that_fits():
     crowded = PairsLayout(min_range_m=3.0, max_range_m=4.0, max_azimuth_deg=5.0, separation_m=0.5)
     with pytest.raises(OptionError, match=r"only \d+ of 40 placements fit"):

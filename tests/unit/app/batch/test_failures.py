@@ -103,6 +103,7 @@ def test_what_a_file_lacks_is_an_outcome(name, change, status, final, words, row
     assert outcome.hint or status == "failed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -131,6 +132,7 @@ def test_to_be_interrupted_is_no_outcome(row, tmp_path, monkeypatch):
     assert not (tmp_path / "results" / "results").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "function", "error", "final", "files"),
     [

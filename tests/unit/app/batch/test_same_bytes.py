@@ -72,6 +72,7 @@ def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
     return Commands(tmp_path / "commands", capsys)
 
 
+@pytest.mark.slow
 def test_a_clicked_session(commands, tmp_path):
     row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "colmap"))
     outcome, files = done(row, tmp_path / "results")
@@ -93,6 +94,7 @@ def test_a_clicked_session(commands, tmp_path):
     assert replace(again, run=None) == replace(outcome, run=None)
 
 
+@pytest.mark.slow
 def test_intrinsics_of_a_file_a_measured_position_and_options(commands, tmp_path):
     given = tmp_path / "camera.yaml"
     commands.solve("--clicks", CLICKS)
@@ -114,6 +116,7 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands, tmp_path
     assert outcome.steps["evaluate"] == "done"
 
 
+@pytest.mark.slow
 def test_clicks_of_a_person_and_of_nobody(commands, tmp_path, monkeypatch):
     given = tmp_path / "clicks.json"
     document = json.loads(CLICKS.read_text())

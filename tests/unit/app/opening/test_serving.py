@@ -38,6 +38,7 @@ def until_closed(socket: ClientConnection) -> None:
         wanted(socket, "never")
 
 
+@pytest.mark.slow
 def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics, tmp_path):
     camera = (without_intrinsics / "camera.yaml").read_bytes()
     (without_intrinsics / "damaged.bag").write_bytes(b"GIF89a")
@@ -95,6 +96,7 @@ def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics
     assert [(entry["name"], entry["clicks"]) for entry in recent] == [("recording_csv", 1)]
 
 
+@pytest.mark.slow
 def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_its_code(without_intrinsics, tmp_path):
     with served_process(without_intrinsics / "recording_csv", "--radar-topic", "/nope", "--on-problem", "ask",
                         state=tmp_path) as server:  # fmt: skip
@@ -106,6 +108,7 @@ def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_
         assert server.stop()[0] == 2
 
 
+@pytest.mark.slow
 def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics, tmp_path):
     other = tmp_path / "other.cocalib-session"
     other.mkdir()

@@ -53,6 +53,7 @@ def test_commands_without_rerun_work_where_it_is_missing(project_root):
     assert answer.returncode == 0, answer.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("--out", "view.rrd")], ids=["window", "file"])
 def test_commands_that_need_rerun_say_how_to_install_it(more, tmp_path):
     answer = without_rerun("show", tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)

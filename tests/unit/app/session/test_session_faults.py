@@ -40,6 +40,7 @@ def test_no_single_bit_changes_a_session_silently(short, folder, name, with_othe
     assert counts.total() == 8 * len(short.journal)
 
 
+@pytest.mark.slow
 def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path, folder):
     counts = every_kill(made_session(12, tmp_path / "made"), folder)
     assert counts == {"continued": counts.total()}

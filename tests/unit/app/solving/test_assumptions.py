@@ -43,6 +43,7 @@ def solved(workspace: Workspace, clicks: str) -> Calibration:
     return workspace.session.outcome
 
 
+@pytest.mark.slow
 def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(recording, project_root, tmp_path):
     workspace = workspace_of(recording, tmp_path)
     clicks = (project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8")

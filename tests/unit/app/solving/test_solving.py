@@ -66,6 +66,7 @@ def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibrat
     return solve_clicks(recording, clicks, recording.camera(), CalibrationOptions()).unwrap()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "leads"),
     [("none", False), ("one in a window", True), ("a few elsewhere", False), ("many elsewhere", True)],
@@ -99,6 +100,7 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(tmp_path, recording
     assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "count"), [(7, 20), (100, 20), (108, 20), (114, 10), (115, 10)])
 def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(recording, clicks, seed, count):
     pixels = [(click.u_px, click.v_px) for click in clicks[:count]]
@@ -108,6 +110,7 @@ def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(recor
     assert verdict_on(outcome).level == "contradictory"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "code", "lost", "exits"),
     [
@@ -181,6 +184,7 @@ def test_a_gap_within_a_damaged_recording_touches_the_click_in_it(tmp_path, reco
         assert lost == ([] if touched is None else [touched])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recording, clicks, seed):
     order = [clicks[place] for place in np.random.default_rng(seed).permutation(len(clicks))]

@@ -80,6 +80,7 @@ def test_a_message_of_its_own_frame_is_unpacked_whole_or_refused():
 # No damaged recording loses a message that can be read, by brute force or by rosbags, without a word.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_messages_that_can_be_read_are_given_or_their_loss_is_told(kind, tmp_path):
     found = list(outcomes(kind, tmp_path, random.Random(kind), 80))

@@ -73,6 +73,7 @@ def test_a_file_cut_anywhere_gives_its_complete_messages(finished, tmp_path):
     files.close()
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 2**31), largest=st.sampled_from([50, 700, 4000, 50_000]))
 def test_pieces_of_any_size_give_the_index_of_the_finished_file(finished, tmp_path, seed, largest):

@@ -61,6 +61,7 @@ def contents(path):
         )
 
 
+@pytest.mark.slow
 def test_reopening_gives_the_same_and_reads_neither_index_nor_stamps_again(path, folder, monkeypatch):
     first = contents(path)
     assert any(folder.glob("*.index.npz"))
@@ -86,6 +87,7 @@ def test_a_changed_file_is_read_again(path, folder):
     assert len(set(folder.iterdir()) - before) >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage", [lambda raw: b"", lambda raw: raw[:-100], lambda raw: raw[:300] + bytes(200) + raw[500:], lambda _: b"{}"]
 )

@@ -38,6 +38,7 @@ EXPECTED: dict[str, list[Any]] = json.loads(Path(__file__).with_name("malformed_
 """Number of scans, number of images, and all messages: warnings, topic problems, or the error."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_complete_messages_are_recovered_losses_are_reported_and_a_first_image_is_complete_or_none(
     name, tmp_path, jpeg
@@ -83,6 +84,7 @@ FUZZED = (
 NUMBERS = (b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x01\0\0\x40", b"\0\0\0\x10")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FUZZED)
 def test_hostile_heads_lengths_and_offsets_never_crash_hang_or_eat_memory(name, tmp_path, jpeg):
     raw = CASES[name](Kit(tmp_path, jpeg)).read_bytes()

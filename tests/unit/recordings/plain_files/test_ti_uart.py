@@ -139,6 +139,7 @@ def test_a_scan_without_points_counts_as_empty(tmp_path):
         assert np.diff(recording.radar_scans().first_return)[0] == 0
 
 
+@pytest.mark.slow
 def test_damage_costs_only_the_packets_it_hits_and_is_told(tmp_path):
     made = scans(30, np.random.default_rng(8))
     data = stream(made)

@@ -34,6 +34,7 @@ def test_every_layout_of_the_registry_has_a_sample():
     assert sorted(NAMES) == sorted([*CLOUDS, *OTHERS])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_layout_is_recognised_and_read(name, ros, write):
     expected = sample(ros, name)
@@ -69,6 +70,7 @@ def damaged(payload: bytes, rng: random.Random) -> bytes:
     return bytes(raw)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name, ros, write):
     path = write(ros, [("/radar", START_NS, sample(ros, name).messages[0])])

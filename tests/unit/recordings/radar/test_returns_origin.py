@@ -44,6 +44,7 @@ def decided(origin: ReturnsOrigin) -> tuple[Origin, bool, tuple[str, ...]]:
 OPEN = ("radar-in-vehicle-frame",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("numbers", MOUNTS)
 @pytest.mark.parametrize("radar", ["awr1843", "imaging"])
 @pytest.mark.parametrize("seed", [1, 2])

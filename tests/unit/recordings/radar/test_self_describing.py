@@ -58,6 +58,7 @@ def test_confirmed_assumptions_are_no_longer_open_and_give_no_warning(name):
         assert "assumed" not in [warning.code for warning in recording.warnings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name):
     layout = LAYOUTS[name]

@@ -354,6 +354,7 @@ def test_names_of_radars_are_what_their_topics_have_in_common():
     assert sensor_name(["/alone"]) == "/alone"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("preset", "topics", "alternatives"),
     [("near-far", 2, False), ("near-far-azimuths", 4, True), ("near-far-column", 2, True), ("lidar-name", 1, False)],

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
@@ -140,6 +141,7 @@ def test_a_writer_that_stops_is_told(tmp_path, monkeypatch):
     follow(tmp_path, story)
 
 
+@pytest.mark.slow
 def test_placements_are_found_while_the_reflector_still_stands(recording):
     """In steps of two seconds; the first is there for more than half of the recording so far, and is found later."""
     found: dict[int, float] = {}

@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -74,6 +75,7 @@ def clicked(count: int) -> View:
     return view(history, FACTS)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(views, st.booleans()), min_size=1, max_size=8))
 def test_a_page_that_applies_changes_has_the_newest_view(steps):
     """The second of each pair says whether the page reads at this moment; a page that does not gets one change later."""
@@ -103,6 +105,7 @@ def test_rows_may_move_and_share_an_id(before, after):
     assert (applied(page, json.loads(change)) if change else page) == json.loads(encode(after))
 
 
+@pytest.mark.slow
 def test_a_click_costs_the_same_however_many_there_are():
     sizes = []
     for count in (10, 400):

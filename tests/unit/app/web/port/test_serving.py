@@ -286,6 +286,7 @@ def printed(running: subprocess.Popen[str], text: str) -> bool:
     return any(text in line for line in running.stdout)
 
 
+@pytest.mark.slow
 @POSIX_SIGNALS
 @pytest.mark.parametrize(
     ("sigint", "sent", "code"),
@@ -327,6 +328,7 @@ threading.Thread(target=raise_when_it_waits, daemon=True).start()
 """
 
 
+@pytest.mark.slow
 @POSIX_SIGNALS
 @pytest.mark.parametrize(
     ("patch", "sent", "later"),
@@ -369,6 +371,7 @@ SessionFile.close = parse_for_ever
 """
 
 
+@pytest.mark.slow
 @POSIX_SIGNALS
 def test_ten_sigterms_within_a_parse_end_the_program_and_confirmed_clicks_are_on_the_disk(tmp_path):
     session = tmp_path / "session"
