@@ -839,6 +839,12 @@ export interface Snapped {
   id: string | null;
 }
 
+/** What the file is that was dropped last: the page gives it to whoever takes such files. */
+export interface Dropped {
+  type: "dropped";
+  kind: "camera" | "clicks" | "calibration" | "boxes";
+}
+
 /** A request of the user could not be carried out. */
 export interface Problem {
   type: "error";
@@ -1156,6 +1162,15 @@ export interface MovingBoxesWanted {
   request?: number;
 }
 
+/** A file was dropped on the page, which asks what it is; one message `dropped` answers. */
+export interface FileDropped {
+  type: "file_dropped";
+  name: string;
+  content_base64: string;
+  is_whole?: boolean;
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1224,6 +1239,7 @@ export type FromServer =
   | ProposalNews
   | Progress
   | Snapped
+  | Dropped
   | Problem
   | Done;
 
@@ -1262,6 +1278,7 @@ export type FromPage =
   | SnapWanted
   | BoxesWanted
   | MovingBoxesWanted
+  | FileDropped
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -74,9 +74,23 @@ def boxes_from_bytes(
     Raises:
         InputError: it cannot be read, is of no known format, or belongs to another recording.
     """
+    return _boxes_in(_sent_file(data, name, image_size_px), image_times, image_names)
+
+
+def holds_boxes(data: bytes, name: str) -> bool:
+    """Return whether a content is of a known format of boxes, of whatever recording."""
+    try:
+        file = _sent_file(data, name, None)
+        return any(known.recognizes(file) for known in BOX_FORMATS)
+    except InputError:
+        return False
+
+
+def _sent_file(data: bytes, name: str, image_size_px: tuple[int, int] | None) -> BoxFile:
+    """Parse what was sent instead of named by a path."""
     source = name_text(Path(name).name) or "boxes"
     members = _archive(data, source) if data.startswith(b"PK") else {source: data}
-    return _boxes_in(_box_file(source, members, image_size_px), image_times, image_names)
+    return _box_file(source, members, image_size_px)
 
 
 def _boxes_in(file: BoxFile, image_times: TimesNs, image_names: Sequence[str]) -> Boxes:

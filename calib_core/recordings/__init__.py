@@ -1,7 +1,7 @@
 """Read recordings: ROS 1 and ROS 2 files in; radar scans, images and intrinsics out. No other package knows containers."""
 
 from calib_core.recordings.camera.images import EncodedImage
-from calib_core.recordings.containers.opening import holds_recording
+from calib_core.recordings.containers.opening import begins_recording, holds_recording
 from calib_core.recordings.containers.sources import assumption_hint, assumption_warnings
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
@@ -36,6 +36,7 @@ __all__ = [
     "WrittenVideo",
     "assumption_hint",
     "assumption_warnings",
+    "begins_recording",
     "clock_lines",
     "describe",
     "figures_text",

@@ -42,6 +42,16 @@ export async function content(reading) {
   }
 }
 
+/** The bytes of a file in base 64; null if they cannot be read. @param {Blob} file @returns {Promise<string|null>} */
+export function inBase64(file) {
+  return new Promise((ready) => {
+    const reader = new FileReader();
+    reader.onload = () => ready(String(reader.result).replace(/^[^,]*,/, ""));
+    reader.onerror = () => ready(null);
+    reader.readAsDataURL(file);
+  });
+}
+
 /** Said when an answer broke off. */
 export const BROKE_OFF = "The server stopped before its answer was complete. Your clicks are safe.";
 

@@ -293,12 +293,15 @@ const field = make("input", "", []);
 field.type = "file";
 field.accept = ".json,application/json";
 field.onchange = async () => {
-  const file = field.files?.[0];
-  if (!file) return;
-  const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
-  if (refusal) toast(refusal);
+  if (field.files?.[0]) await takeClicks(field.files[0]);
   field.value = "";
 };
+
+/** Add the clicks of a file. @param {File} file */
+export async function takeClicks(file) {
+  const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
+  if (refusal) toast(refusal);
+}
 
 /** Ask for a file of clicks, and add them. */
 function loadClicks() {

@@ -1,9 +1,10 @@
 /**
  * Choosing what is opened and how: the dialog behind "Recording…" with its parts, which the server also opens with a question, the strip
- * on a recording without intrinsics, and camera files dropped on the page.
+ * on a recording without intrinsics.
  */
 
 import { register } from "../base/actions.js";
+import { inBase64 } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send, tell, unconfirmed } from "../base/socket.js";
@@ -44,22 +45,7 @@ export function startOpening() {
   dialog.addEventListener("cancel", (event) => {
     if (!state.recording) event.preventDefault(); // there is nothing behind it
   });
-  window.addEventListener("dragover", (event) => {
-    if (!carriesFile(event)) return;
-    event.preventDefault();
-    document.body.classList.add("dropping");
-  });
-  for (const end of ["dragleave", "drop"]) window.addEventListener(end, () => document.body.classList.remove("dropping"));
-  window.addEventListener("drop", (event) => {
-    if (!carriesFile(event)) return;
-    event.preventDefault();
-    const file = event.dataTransfer?.files[0];
-    if (file) give(file);
-  });
 }
-
-/** @param {DragEvent} event */
-const carriesFile = (event) => Array.from(event.dataTransfer?.types ?? []).includes("Files");
 
 /** @returns {Draft} */
 function emptyDraft() {
@@ -189,14 +175,14 @@ export async function openAgain(changed) {
 }
 
 /** Use a file of intrinsics: in the dialog it is chosen, outside it is used at once. @param {File} file */
-async function give(file) {
+export async function give(file) {
   const refuse = (/** @type {string} */ words) => {
     problem = words;
     if (dialog.open) draw();
     else toast(words);
   };
   if (file.size > MAX_FILE_BYTES) return refuse(`${file.name} has ${(file.size / 1e6).toFixed(1)} MB, and a file of intrinsics has a few kB. Drop the YAML, XML or JSON file of the camera.`);
-  const data = await content(file);
+  const data = await inBase64(file);
   if (data === null) return refuse(`${file.name} cannot be read by the browser; a folder cannot be dropped. Choose the file itself.`);
   problem = "";
   if (!dialog.open && !(await known())) return;
@@ -204,16 +190,6 @@ async function give(file) {
   draft.file = { name: file.name, data, camera: "" };
   if (dialog.open) draw();
   else choose();
-}
-
-/** The bytes of a file in base 64; null if they cannot be read. @param {File} file @returns {Promise<string|null>} */
-function content(file) {
-  return new Promise((ready) => {
-    const reader = new FileReader();
-    reader.onload = () => ready(String(reader.result).replace(/^[^,]*,/, ""));
-    reader.onerror = () => ready(null);
-    reader.readAsDataURL(file);
-  });
 }
 
 /** Look into a folder. @param {string} path */

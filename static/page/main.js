@@ -39,6 +39,7 @@ import { startSpace, takeSpace } from "../space/space.js";
 import { activity, startImageChanges } from "../time/lanes.js";
 import { frameFailed, goTo, receiveFrame, registerTime, requestAgain, startLive, takeFollowing, takeFrames, tellCursor } from "../time/player.js";
 import { startTimeline } from "../time/timeline.js";
+import { startDropping, takeDropped } from "./dropping.js";
 import { startHelp } from "./help.js";
 import { listen, startRoving } from "./keys.js";
 import { startPalette } from "./palette.js";
@@ -103,6 +104,7 @@ const readers = {
   proposals: takeProposals,
   lens_result: takeResult,
   snapped: takeSnapped,
+  dropped: takeDropped,
   error(message) {
     toast(message.message, message.hint);
     frameFailed(message.request);
@@ -187,6 +189,7 @@ startDescribing();
 startArriving();
 startLooking();
 startOpening();
+startDropping();
 startWarnings();
 listen(window);
 for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-action]"))) button.addEventListener("click", () => act(actionNamed(button.dataset.action ?? "")));

@@ -1,5 +1,6 @@
 /** Two solutions side by side: chosen here, compared by the server, drawn over the image with two shapes. */
 
+import { inBase64 } from "../base/asking.js";
 import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { tell } from "../base/socket.js";
@@ -69,7 +70,6 @@ export function startCompare() {
   };
   blending.append(make("span", "", "in the image: A"), slider, make("span", "", "B"));
   document.getElementById("page-review")?.append(box);
-  listenToDrops();
   on(["view", "selected"], refresh);
   on(["box"], () => void (visible() !== open && refresh()));
   on(["connection"], () => {
@@ -151,31 +151,10 @@ function draw() {
   rows.replaceChildren(...known.rows.map((row) => make("tr", "", [make("td", "", row.label), make("td", "", row.text)])));
 }
 
-/** A calibration file dropped anywhere becomes B; files of clicks go where they are loaded. */
-function listenToDrops() {
-  const page = /** @type {HTMLElement} */ (document.getElementById("panel"));
-  page.addEventListener("dragover", (event) => {
-    if (!visible()) return;
-    event.preventDefault();
-    box.classList.add("dropping");
-  });
-  page.addEventListener("dragleave", () => box.classList.remove("dropping"));
-  page.addEventListener("drop", (event) => {
-    box.classList.remove("dropping");
-    const dropped = event.dataTransfer?.files[0];
-    if (!visible() || !dropped) return;
-    event.preventDefault();
-    takeFile(dropped);
-  });
-}
-
-/** @param {File} given */
-async function takeFile(given) {
+/** Compare with a calibration file, where B is not chosen otherwise. @param {File} given */
+export async function takeFile(given) {
   if (given.size > LARGEST_FILE) return toast(`${given.name} is too large for a calibration.`, "Give a calibration file: calibration.json, or one of another program.");
-  const bytes = new Uint8Array(await given.arrayBuffer());
-  let text = "";
-  for (let at = 0; at < bytes.length; at += 32768) text += String.fromCharCode(...bytes.subarray(at, at + 32768));
-  file = { name: given.name, base64: btoa(text) };
+  file = { name: given.name, base64: (await inBase64(given)) ?? "" };
   fileSent = false;
   if (chosen.a !== "file") chosen.b = "file";
   drawMenus();

@@ -4,6 +4,7 @@
  */
 
 import { register, withImages } from "../base/actions.js";
+import { inBase64 } from "../base/asking.js";
 import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
@@ -32,7 +33,7 @@ export function startEvaluating() {
     { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withImages },
   );
   const load = make("button", "second", "Load boxes…");
-  load.dataset.hint = "Boxes of a labeling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on this sheet does the same.";
+  load.dataset.hint = "Boxes of a labeling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on the page does the same.";
   find.dataset.hint = "Boxes around whatever moves before a camera that stands still.";
   load.onclick = chooseBoxes;
   find.onclick = findMoving;
@@ -45,15 +46,6 @@ export function startEvaluating() {
   };
   figures.setAttribute("aria-label", "What the boxes say");
   page.append(make("div", "box-files", [load, find, picker]), about, figures);
-  page.addEventListener("dragover", (event) => event.preventDefault());
-  page.addEventListener("drop", (event) => {
-    const dropped = event.dataTransfer?.files[0];
-    if (!dropped) return;
-    event.preventDefault();
-    event.stopPropagation();
-    document.body.classList.remove("dropping");
-    takeBoxes(dropped);
-  });
   on(["theme"], draw);
 }
 
@@ -66,13 +58,10 @@ const chooseBoxes = () => picker.click();
 /** Judge by boxes around what moves. */
 const findMoving = () => tell({ type: "find_moving" });
 
-/** @param {File} given */
-async function takeBoxes(given) {
+/** Judge by the boxes of a file. @param {File} given */
+export async function takeBoxes(given) {
   if (given.size > LARGEST_FILE) return toast(`${given.name} is too large for the page.`, "Give it to cocalib evaluate --boxes instead.");
-  const bytes = new Uint8Array(await given.arrayBuffer());
-  let text = "";
-  for (let at = 0; at < bytes.length; at += 32768) text += String.fromCharCode(...bytes.subarray(at, at + 32768));
-  const refusal = await send({ type: "load_boxes", name: given.name, content_base64: btoa(text) });
+  const refusal = await send({ type: "load_boxes", name: given.name, content_base64: await inBase64(given) });
   if (refusal) toast(refusal);
 }
 

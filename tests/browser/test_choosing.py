@@ -1,6 +1,7 @@
 """The dialog that chooses what is opened: a camera file is dropped, a radar is chosen, a folder is browsed."""
 
 import base64
+import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -13,6 +14,7 @@ from calib_core.synthetic.files import write_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.recording import simulate
+from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 from tests.image_recording import grey_frames
 from tests.served_process import ServedProcess, served_process
@@ -69,8 +71,9 @@ def test_without_intrinsics_one_can_click_and_a_dropped_camera_file_gives_the_po
     before = page.view["clicks"]
     assert len(before) == 6
     for name, data, words in (
-        ("photo.png", b"\x89PNG\r\n\xff", "photo.png: not a text file"),
-        ("large.yaml", b"#" * 600_000, "a file of intrinsics has a few kB"),
+        ("photo.png", b"\x89PNG\r\n\xff", "photo.png is no camera"),
+        ("large.yaml", camera + b"\n# large" * 80_000, "large.yaml is no camera"),
+        ("drive.bag", b"#ROSBAG V2.0\n" * 300_000, "cocalib open drive.bag"),
         ("other.yaml", camera.replace(b"320", b"640"), "calibrated for 640 x 200 px, but the frames have 320 x 200 px"),
     ):
         drop(page, name, data)
@@ -85,6 +88,23 @@ def test_without_intrinsics_one_can_click_and_a_dropped_camera_file_gives_the_po
     assert page.value("__cocalib.state.recording.intrinsics") == "camera.yaml"
     assert page.page.is_hidden("#intrinsics-strip")
     page.forget_lost_connections()
+
+
+def test_clicks_a_calibration_and_boxes_are_taken_wherever_they_are_dropped(
+    open_page: Callable[..., Driver], server: RunningServer, project_root: Path
+) -> None:
+    page = open_page(server.url)
+    drop(page, "marks.txt", (project_root / "sample_data/rooftop/clicks.json").read_bytes())
+    page.until("__cocalib.state.view.clicks.length === 20 && __cocalib.state.view.has_calibration")
+    page.settle()
+    drop(page, "other.json", page.page.request.get(f"{page.page.url}api/calibration.json").body())
+    page.until("document.querySelector('.compare .verdict').innerText.includes('other.json')")
+    assert page.page.is_visible("#page-check")
+    image = {"id": 1, "file_name": "1.jpg", "width": 4, "height": 4}
+    coco = {"images": [image], "annotations": [], "categories": []}
+    drop(page, "boxes.txt", json.dumps(coco).encode())
+    page.until("document.getElementById('toasts').innerText.includes('boxes.txt')")
+    assert page.page.is_visible("#page-evaluate")
 
 
 @pytest.mark.slow

@@ -127,6 +127,14 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
     return CameraFile.read(path).camera(image_size_px=image_size_px)
 
 
+def holds_camera(text: str, source: str = "camera") -> bool:
+    """Return whether a text has a camera that `read_camera` finds, or several."""
+    try:
+        return bool(_own_syntax(text, source=source) or _keyed(text, source=source))
+    except InputError:
+        return False
+
+
 def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
     """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
     for value in CAMERA_FORMATS.values():

@@ -63,6 +63,11 @@ def holds_recording(path: Path) -> bool:
     return any((folder / _METADATA).is_file() for folder in folders) or any(map(_is_recording, path.iterdir()))
 
 
+def begins_recording(head: bytes) -> bool:
+    """Return whether a file that begins so is a recording of ROS messages."""
+    return head.startswith((b"#ROSBAG V", mcap_records.MAGIC, sqlite.MAGIC))
+
+
 def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
     """Open every recording file named by the paths or contained in them.
 

@@ -21,6 +21,7 @@ from cocalib.session.state import Session
 from cocalib.solving.solving import window_candidates
 from cocalib.view.candidates import PairCandidates, click_candidates, pair_of_click
 from cocalib.view.wording import sentence
+from cocalib.web.channel.dropped_file import sorted_file
 from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.opening_service import opening_answers
 from cocalib.web.channel.outbox import NewestWins, Outbox, Shown
@@ -32,6 +33,7 @@ from cocalib.web.messages.incoming import (
     BoxesWanted,
     Command,
     CursorMoved,
+    FileDropped,
     FrameWanted,
     Hello,
     ImportWanted,
@@ -89,6 +91,7 @@ class Channel:
             ViewpointWanted: self._look_from,
             SnapWanted: self._snap,
             ImportWanted: self._import,
+            FileDropped: self._sort,
             ProposingSwitch: hub.proposing.switch,
             BoxesWanted: hub.boxes.take,
             MovingBoxesWanted: hub.boxes.find,
@@ -187,6 +190,15 @@ class Channel:
 
     async def _import(self, wanted: ImportWanted) -> None:
         await self._change(partial(self._hub.workspace.import_clicks, wanted.text, wanted.name))
+
+    async def _sort(self, file: FileDropped) -> None:
+        """Say what a dropped file is.
+
+        Raises:
+            InputError: it is nothing that the page takes.
+        """
+        sort = partial(sorted_file, file, has_camera=self._hub.camera is not None)
+        self.outbox.put(encode(await asyncio.get_running_loop().run_in_executor(self._hub.executor, sort)))
 
     async def _step(self, step: Step) -> None:
         await self._change(partial(self._hub.workspace.dispatch, step))

@@ -125,6 +125,20 @@ class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "c
     content: bytes
 
 
+class FileDropped(_Request, frozen=True, tag="file_dropped", rename={"content": "content_base64"}):
+    """A file was dropped on the page, which asks what it is; one message `dropped` answers.
+
+    Attributes:
+        name: of the file.
+        content: of the file, or its beginning.
+        is_whole: whether it is all of it.
+    """
+
+    name: Annotated[str, Meta(min_length=1, max_length=300)]
+    content: bytes
+    is_whole: bool = True
+
+
 class MovingBoxesWanted(_Request, frozen=True, tag="find_moving"):
     """The calibration is to be judged by boxes around what moves before the camera."""
 
@@ -181,6 +195,7 @@ Command: TypeAlias = (
     | SnapWanted
     | BoxesWanted
     | MovingBoxesWanted
+    | FileDropped
 )
 Message: TypeAlias = Command | ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
 

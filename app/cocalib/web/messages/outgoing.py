@@ -323,6 +323,16 @@ class Progress:
     total: int
 
 
+DroppedKind: TypeAlias = Literal["camera", "clicks", "calibration", "boxes"]
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """What the file is that was dropped last: the page gives it to whoever takes such files."""
+
+    kind: DroppedKind
+
+
 @dataclass(frozen=True, slots=True)
 class Snapped:
     """The reflector's apex near a pixel, or why there is none; nothing was changed.
@@ -410,6 +420,7 @@ Outgoing: TypeAlias = (
     | ProposalNews
     | Progress
     | Snapped
+    | Dropped
     | Problem
     | Done
 )
@@ -439,6 +450,7 @@ TYPES: Mapping[type, str] = {
     ProposalNews: "proposals",
     Progress: "progress",
     Snapped: "snapped",
+    Dropped: "dropped",
     Problem: "error",
     Done: "done",
 }
