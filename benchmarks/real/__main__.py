@@ -11,8 +11,6 @@ from benchmarks.real.page import page, set_table, table_csv
 from benchmarks.real.sets import SETS, RealSet
 from calib_core.errors import CalibrationError
 
-__all__ = ["main", "outcome_of"]
-
 _ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -5,20 +5,42 @@ import csv
 import json
 import re
 import shutil
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.real.contents import Contents
 from calib_core import read_camera
+from calib_core.arrays import Points2, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.importing import read_any_file
 from calib_core.measurements import ReflectorClick, TimeNs
 
-__all__ = ["camera_points", "chessboards", "fisheye_pairs", "npy_clicks", "road", "two_reflectors", "view_of_delft"]
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contents:
+    """Pairs, or a recording with clicks or boxes.
+
+    Attributes:
+        camera: the intrinsics that the authors state; None if the recording holds them.
+        published: the extrinsics that they state; None if there are none.
+        points_radar_m: (n, 3) positions of pairs.
+        pixels_px: (n, 2) where the camera saw them.
+        recording: what `open_recording` reads.
+        clicks: on reflectors in it.
+        boxes: what `read_boxes` reads.
+    """
+
+    camera: Camera | None
+    published: RigidTransform | None = None
+    points_radar_m: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
+    pixels_px: Points2 = field(default_factory=lambda: np.zeros((0, 2)))
+    recording: Path | None = None
+    clicks: tuple[ReflectorClick, ...] = ()
+    boxes: Path | None = None
 
 
 def camera_points(root: Path, _: Path, points: str, extrinsics: str, lens: str) -> Contents:
@@ -48,6 +70,7 @@ def npy_clicks(root: Path, _: Path, extrinsics: str, pixels: str, points: str, l
 def chessboards(root: Path, _: Path, poses: str, published: str, images: str) -> Contents:
     """Find the board and the lens in the images, and take the lidar's board centres; the pose is the mean of 50 runs."""
     import cv2
+    from scipy.spatial.transform import Rotation
 
     corners_m = np.zeros((35, 3), dtype=np.float32)
     corners_m[:, :2] = 0.105 * (np.mgrid[0:7, 0:5].T.reshape(-1, 2) - np.array([3.0, 2.0]))  # the centre is the origin
@@ -62,8 +85,10 @@ def chessboards(root: Path, _: Path, poses: str, published: str, images: str) ->
     pixels = camera.project(np.array(shifts)[:, :, 0])
     rows = list(csv.reader((root / poses).open(encoding="utf-8")))
     centres_mm = np.array([rows[6 + 19 * i] for i in range(40)], dtype=np.float64)
-    runs = np.loadtxt(root / published, delimiter=",", skiprows=1)
-    return Contents(camera, _mean_of_runs(runs), centres_mm / 1000.0, pixels)
+    runs = np.loadtxt(root / published, delimiter=",", skiprows=1)  # roll, pitch, yaw and position of the camera
+    turn = Rotation.from_euler("ZYX", runs[:, 2::-1]).mean().as_matrix()
+    pose = RigidTransform(turn, runs[:, 3:].mean(axis=0)).inverse()
+    return Contents(camera, pose, centres_mm / 1000.0, pixels)
 
 
 def road(root: Path, scratch: Path, image: str, radar: str, lens: str, extrinsics: str) -> Contents:
@@ -85,7 +110,7 @@ def view_of_delft(root: Path, _: Path, *_files: str) -> Contents:
     return Contents(None, pose, recording=radar, boxes=root / "example_set" / "lidar" / "training" / "label_2")
 
 
-SCENES: dict[str, tuple[tuple[float, float], ...]] = {
+_SCENES: dict[str, tuple[tuple[float, float], ...]] = {
     "10_center_right1": ((330.8, 232.6), (462.5, 235.3)),
     "15_center_10_left2": ((328.8, 219.8), (15.5, 231.9)),
     "15_lef1_right1": ((235.3, 219.2), (441.0, 221.9)),
@@ -93,9 +118,7 @@ SCENES: dict[str, tuple[tuple[float, float], ...]] = {
     "25_left1_right1": ((212.4, 202.4), (464.6, 207.7)),
 }
 """Both boards of each scene, clicked by us in the frame in its middle."""
-_MESSAGE = "std_msgs/Header header\n" + "".join(
-    f"float32[] {name}\n" for name in ("range", "azimuth1", "azimuth2", "vrelrad", "snr")
-)
+_MESSAGE = "std_msgs/Header header\nfloat32[] range\nfloat32[] azimuth1\nfloat32[] azimuth2\nfloat32[] vrelrad\nfloat32[] snr\n"
 
 
 def two_reflectors(root: Path, scratch: Path, *_files: str) -> Contents:
@@ -107,31 +130,34 @@ def two_reflectors(root: Path, scratch: Path, *_files: str) -> Contents:
     store.register(get_types_from_msg(_MESSAGE, "radar/msg/Detections"))
     header, stamp = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
     radar, image = store.types["radar/msg/Detections"], store.types["sensor_msgs/msg/CompressedImage"]
+
+    def stamped(at: int, frame: str) -> Any:
+        return header(0, stamp(at // 10**9, at % 10**9), frame)
+
     messages: list[tuple[int, str, Any]] = []
     clicks: list[ReflectorClick] = []
-    for scene, boards in SCENES.items():
+    for scene, boards in _SCENES.items():
         frames = sorted((root / "data" / "camera" / scene).glob("*.jpg"))
         middle = TimeNs(time_ns(frames[len(frames) // 2].stem))
         clicks += [ReflectorClick(middle, f"{scene}-{u:.0f}", u, v) for u, v in boards]
         for path in frames:
             at = time_ns(path.stem)
             content = np.frombuffer(path.read_bytes(), np.uint8)
-            messages.append(
-                (at, "/camera", image(header(0, stamp(at // 10**9, at % 10**9), "camera"), "jpeg", content))
-            )
+            messages.append((at, "/camera", image(stamped(at, "camera"), "jpeg", content)))
         for row in csv.DictReader((root / "data" / "RADAR" / f"{scene}-radar_img.csv").open(encoding="utf-8")):
             at = time_ns(row["time"])
             columns = (".range", ".azimuth1", ".azimuth2", ".VrelRad", ".SNR")
             arrays = [np.array(ast.literal_eval(row[name]), np.float32).ravel() for name in columns]
-            messages.append((at, "/radar", radar(header(0, stamp(at // 10**9, at % 10**9), "radar"), *arrays)))
+            messages.append((at, "/radar", radar(stamped(at, "radar"), *arrays)))
     with Writer(scratch / "five.bag") as bag:
         topics = {"/camera": image.__msgtype__, "/radar": radar.__msgtype__}
         written = {topic: bag.add_connection(topic, kind, typestore=store) for topic, kind in topics.items()}
         for at, topic, message in sorted(messages, key=lambda message: message[0]):
             bag.write(written[topic], at, store.serialize_ros1(message, topics[topic]))
     matrix = np.array([[706.0, 0.0, 320.0], [0.0, 706.0, 240.0], [0.0, 0.0, 1.0]])
-    camera = Camera("pinhole", 640, 480, matrix, np.zeros(0))
-    return Contents(camera, None, recording=scratch / "five.bag", clicks=tuple(clicks))
+    return Contents(
+        Camera("pinhole", 640, 480, matrix, np.zeros(0)), recording=scratch / "five.bag", clicks=tuple(clicks)
+    )
 
 
 def time_ns(text: str) -> int:
@@ -144,11 +170,3 @@ def _rigid(matrix: np.ndarray, translation_m: np.ndarray) -> RigidTransform:
     """Return the pose with the nearest rotation: published matrices are rounded."""
     u, _, vt = np.linalg.svd(matrix)
     return RigidTransform(u @ vt, translation_m)
-
-
-def _mean_of_runs(runs: np.ndarray) -> RigidTransform:
-    """Return the mean of lidar-from-camera poses (n, 6), roll, pitch, yaw and position, inverted."""
-    from scipy.spatial.transform import Rotation
-
-    mean = Rotation.from_euler("ZYX", runs[:, 2::-1]).mean()
-    return RigidTransform(mean.as_matrix(), runs[:, 3:].mean(axis=0)).inverse()

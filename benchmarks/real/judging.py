@@ -1,14 +1,16 @@
 """Solve a public set by three methods, and judge it by what its authors published."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
-from benchmarks.real.contents import Contents
+from benchmarks.real.converters import Contents
 from calib_core import acc, pairs_from_arrays
+from calib_core.arrays import Points2, Points3
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -25,10 +27,14 @@ from cocalib.session.state import Outcome
 from cocalib.solving.automatic import place_clicks, solve_placed_clicks
 from cocalib.solving.solving import required_camera, solve_clicks
 
-__all__ = ["METHODS", "TURNS_DEG", "Judged", "PoseFigures", "judged"]
-
 METHODS = ("ours", "Algorithm 1", "OpenCV")
 TURNS_DEG = (0.0, 1.0, 2.0, 5.0)
+_FOLDS = 10
+_Ids: TypeAlias = Sequence[str]
+_Fit: TypeAlias = tuple[RigidTransform, dict[str, float]] | str
+"""A pose with the reprojection error of each pair, or the code why there is none."""
+_Fitting: TypeAlias = Callable[[frozenset[str]], _Fit]
+"""From the ids that are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +45,13 @@ class PoseFigures:
         rotation_deg: angle from the published rotation; NaN without one.
         position_cm: distance of the camera centres.
         error_px: mean reprojection error of all pairs, those set aside included.
+        left_out_px: median distance to the pairs of a tenth that the pose was solved without; NaN if one has none.
     """
 
     rotation_deg: float
     position_cm: float
     error_px: float
+    left_out_px: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,31 +90,35 @@ def judged(contents: Contents, noise: NoiseOptions) -> Judged:
     if contents.recording is None:
         assert contents.camera is not None
         pairs = pairs_from_arrays(contents.points_radar_m, contents.pixels_px, noise=noise)
-        camera = contents.camera
-        return _judged_poses(lambda options: calibrate_pairs(pairs, camera, options), camera, contents.published, noise)
+        return _judged_poses(
+            partial(calibrate_pairs, pairs, contents.camera), contents.camera, contents.published, noise
+        )
     options = RecordingOptions(confirm_assumptions=True)
     with open_recording(contents.recording, options, require=("radar",)) as recording:
         camera = contents.camera or required_camera(recording, None)
         if contents.boxes is not None and contents.published is not None:
             return _judged_boxes(contents.boxes, recording, camera, contents.published)
-        return _judged_poses(partial(_solved, recording, contents.clicks, camera), camera, contents.published, noise)
+        solve = partial(_solved, recording, contents.clicks, camera)
+        return _judged_poses(solve, camera, contents.published, noise)
 
 
 def _solved(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], camera: Camera, options: CalibrationOptions
+    recording: Recording,
+    clicks: Sequence[ReflectorClick],
+    camera: Camera,
+    options: CalibrationOptions,
+    excluded: frozenset[str] = frozenset(),
 ) -> Outcome:
     """Solve a recording by its clicks, or without any."""
     if clicks:
-        return solve_clicks(recording, clicks, camera, options)
+        given = [replace(click, excluded=click.id in excluded) for click in clicks]
+        return solve_clicks(recording, given, camera, options)
     placed = place_clicks(recording, camera, options)
     return placed if isinstance(placed, Unsolvable) else solve_placed_clicks(recording, placed, camera, options)
 
 
 def _judged_poses(
-    solve: Callable[[CalibrationOptions], Outcome],
-    camera: Camera,
-    published: RigidTransform | None,
-    noise: NoiseOptions,
+    solve: Callable[..., Outcome], camera: Camera, published: RigidTransform | None, noise: NoiseOptions
 ) -> Judged:
     """Solve by the three methods; OpenCV gets the radar positions of ours."""
     ours = solve(CalibrationOptions(noise=noise))
@@ -114,24 +126,16 @@ def _judged_poses(
         return Judged(verdict=ours.code)
     points = np.array([pair.point_radar_m for pair in ours.pairs])
     pixels = np.array([pair.pixel_px for pair in ours.pairs])
-    poses: dict[str, PoseFigures | str] = {
-        "ours": _figures(ours.camera_from_radar, published, distances(ours.reproject(points), pixels))
-    }
-    paper = solve(CalibrationOptions(method="paper"))
-    if isinstance(paper, Unsolvable):
-        poses["Algorithm 1"] = paper.code
-    else:
-        spread_px = np.array([pair.distance_px for pair in paper.pairs])
-        poses["Algorithm 1"] = _figures(paper.camera_from_radar, published, spread_px)
-    ransac = solve_pnp_ransac(points, pixels, camera, "sqpnp")
-    if ransac is not None:
-        kept = ransac.inliers
-        pose = refine_lm(points[kept], pixels[kept], camera, ransac.camera_from_radar) or ransac.camera_from_radar
-        poses["OpenCV"] = _figures(pose, published, distances(camera.project(pose @ points), pixels))
+    ids = [pair.id for pair in ours.pairs]
+    fits: tuple[_Fitting, ...] = (
+        partial(_fit, solve, CalibrationOptions(noise=noise)),
+        partial(_fit, solve, CalibrationOptions(method="paper")),
+        partial(_opencv_fit, ids, points, pixels, camera),
+    )
     return Judged(
-        pairs=len(ours.pairs),
+        pairs=len(ids),
         set_aside=sum(not pair.inlier for pair in ours.pairs),
-        poses=poses,
+        poses={method: _figures(fit, ids, published) for method, fit in zip(METHODS, fits, strict=True)},
         published_px=float(distances(camera.project(published @ points), pixels).mean()) if published else np.nan,
         reach=_reach(ours, published) if published else np.nan,
         verdict=verdict_on(ours).level,
@@ -139,13 +143,38 @@ def _judged_poses(
     )
 
 
-def _figures(pose: RigidTransform, published: RigidTransform | None, distances_px: np.ndarray) -> PoseFigures:
-    error_px = float(distances_px.mean())
+def _fit(solve: Callable[..., Outcome], options: CalibrationOptions, excluded: frozenset[str]) -> _Fit:
+    outcome = solve(options, excluded=excluded)
+    if isinstance(outcome, Unsolvable):
+        return outcome.code
+    return outcome.camera_from_radar, {pair.id: pair.distance_px for pair in outcome.pairs}
+
+
+def _opencv_fit(ids: Sequence[str], points: Points3, pixels: Points2, camera: Camera, excluded: frozenset[str]) -> _Fit:
+    used = np.array([name not in excluded for name in ids])
+    ransac = solve_pnp_ransac(points[used], pixels[used], camera, "sqpnp")
+    if ransac is None:
+        return "none"
+    kept = np.flatnonzero(used)[ransac.inliers]
+    pose = refine_lm(points[kept], pixels[kept], camera, ransac.camera_from_radar) or ransac.camera_from_radar
+    return pose, dict(zip(ids, distances(camera.project(pose @ points), pixels).tolist(), strict=True))
+
+
+def _figures(fit: _Fitting, ids: _Ids, published: RigidTransform | None) -> PoseFigures | str:
+    whole = fit(frozenset())
+    if isinstance(whole, str):
+        return whole
+    pose, distances_px = whole
+    left_out_px: list[float] = []
+    for fold in filter(None, (ids[i::_FOLDS] for i in range(_FOLDS))):
+        others = fit(frozenset(fold))
+        left_out_px += [np.nan if isinstance(others, str) else others[1][name] for name in fold]
+    error_px, median_px = float(np.mean(list(distances_px.values()))), float(np.median(left_out_px))
     if published is None:
-        return PoseFigures(np.nan, np.nan, error_px)
+        return PoseFigures(np.nan, np.nan, error_px, median_px)
     turned = np.linalg.norm(published.error_from(pose)[3:])
     apart_m = np.linalg.norm(pose.inverse().translation_m - published.inverse().translation_m)
-    return PoseFigures(float(np.rad2deg(turned)), float(100.0 * apart_m), error_px)
+    return PoseFigures(float(np.rad2deg(turned)), float(100.0 * apart_m), error_px, median_px)
 
 
 def _reach(ours: Calibration, published: RigidTransform) -> float:

@@ -3,16 +3,13 @@
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple
+from dataclasses import asdict, astuple
 
 import numpy as np
 
 from benchmarks.real.judging import METHODS, TURNS_DEG, Judged, PoseFigures
 from benchmarks.real.sets import RealSet
 
-__all__ = ["Outcomes", "page", "set_table", "table_csv"]
-
-_UNITS = ("deg", "cm", "px")
 Outcomes = Mapping[RealSet, Judged | str]
 """What was judged, or why it was not."""
 
@@ -27,8 +24,9 @@ said in its row. `python -m benchmarks.real --list` needs no data. A further set
 - **Ours** is the default method with default options, but where [a row](#the-sets) names the noise. **Algorithm 1** is the
   paper's (`--method paper`). **OpenCV** is RANSAC with SQPnP (8 px), then Levenberg-Marquardt on its inliers, from the radar
   positions that ours chose.
-- Each has its angle from the published rotation, the distance of the two camera positions, and the mean reprojection error of all
-  pairs, those that the method sets aside included. Least squares on all pairs makes that error small; it does not judge the pose.
+- Each has its angle from the published rotation, the distance of the two camera positions, the mean reprojection error of all
+  pairs, those that the method sets aside included, and the median distance to pairs that are left out: a tenth at a time is
+  predicted by the pose of the others. Least squares on all pairs makes the mean small; it does not judge the pose.
 - **Published**: the mean reprojection error of the published pose.
 - **Inside**: whether the published pose is in our 95 % ellipsoid, and how far out it is in the ellipsoid's radius. It is a
   measurement with [errors of its own](#the-sets), so a right estimate may have it outside.
@@ -47,13 +45,16 @@ The license is what the repository states; where it states none, only these figu
 
 def page(outcomes: Outcomes) -> str:
     """Return the page."""
-    with_boxes = {row: judged for row, judged in outcomes.items() if isinstance(judged, Judged) and judged.acc}
-    posed = {row: judged for row, judged in outcomes.items() if row not in with_boxes}
-    head = ("set", "pairs", *METHODS, "published", "inside", "verdict and warnings")
-    turns = ("as published" if not degrees else f"{degrees:g} deg" for degrees in TURNS_DEG)
+    posed, shares = [], []
+    for row, judged in outcomes.items():
+        if isinstance(judged, Judged) and judged.acc:
+            shares.append((row.name, str(judged.returns), *(f"{100.0 * share:.1f} %" for share in judged.acc)))
+        else:
+            posed.append(_pose_cells(row, judged))
+    turns = ("as published", *(f"{degrees:g} deg" for degrees in TURNS_DEG[1:]))
     parts = [
-        *(_HEAD, _table(head, (_pose_cells(row, judged) for row, judged in posed.items()))),
-        *(_ACC, _table(("set", "returns", *turns), (_acc_cells(row, judged) for row, judged in with_boxes.items()))),
+        *(_HEAD, _table(("set", "pairs", *METHODS, "published", "inside", "verdict and warnings"), posed)),
+        *(_ACC, _table(("set", "returns", *turns), shares)),
         *(_SETS, _reference_table(outcomes)),
         *("### Checkouts\n", "```", *dict.fromkeys(row.clone for row in outcomes), "```\n"),
     ]
@@ -94,16 +95,17 @@ def _figures(judged: Judged | str) -> dict[str, object]:
     if isinstance(judged, str):
         return {"not run": judged}
     solved = {method: pose for method, pose in judged.poses.items() if isinstance(pose, PoseFigures)}
-    numbers = {
-        f"{method} {unit}": value
-        for method, pose in solved.items()
-        for unit, value in zip(_UNITS, astuple(pose), strict=True)
-    }
+    numbers = {f"{method} {name}": value for method, pose in solved.items() for name, value in asdict(pose).items()}
     numbers |= {"published px": judged.published_px, "reach": judged.reach}
     numbers |= {f"acc {degrees:g} deg": share for degrees, share in zip(TURNS_DEG, judged.acc, strict=False)}
-    stated = {"pairs": judged.pairs, "set aside": judged.set_aside, "returns": judged.returns}
-    said = {"verdict": judged.verdict, "codes": " ".join(judged.codes)}
-    return {**stated, **{name: f"{value:.3f}" for name, value in numbers.items() if np.isfinite(value)}, **said}
+    counts = {
+        "pairs": judged.pairs,
+        "set aside": judged.set_aside,
+        "returns": judged.returns,
+        "verdict": judged.verdict,
+    }
+    written = {name: f"{value:.3f}" for name, value in numbers.items() if np.isfinite(value)}
+    return {**counts, "codes": " ".join(judged.codes), **written}
 
 
 def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
@@ -111,9 +113,9 @@ def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
         return (row.name, "", judged, "", "", "", "", "")
     aside = f", {judged.set_aside} set aside" if judged.set_aside else ""
     inside = (
-        "no reference"
-        if not np.isfinite(judged.reach)
-        else f"{'yes' if judged.reach <= 1.0 else '**no**'}, {judged.reach:.2f}"
+        f"{'yes' if judged.reach <= 1.0 else '**no**'}, {judged.reach:.2f}"
+        if np.isfinite(judged.reach)
+        else "no reference"
     )
     codes = " ".join(f"`{code}`" for code in judged.codes)
     methods = (_pose_cell(judged.poses.get(method, "none")) for method in METHODS)
@@ -124,12 +126,8 @@ def _pose_cells(row: RealSet, judged: Judged | str) -> tuple[str, ...]:
 def _pose_cell(pose: PoseFigures | str) -> str:
     if isinstance(pose, str):
         return pose
-    apart = f"{pose.rotation_deg:.2f} deg, {pose.position_cm:.1f} cm, " if np.isfinite(pose.rotation_deg) else ""
-    return f"{apart}{pose.error_px:.1f} px"
-
-
-def _acc_cells(row: RealSet, judged: Judged) -> tuple[str, ...]:
-    return (row.name, str(judged.returns), *(f"{100.0 * share:.1f} %" for share in judged.acc))
+    forms = ("{:.2f} deg", "{:.1f} cm", "{:.1f} px", "{:.1f} left out")
+    return ", ".join(form.format(value) for form, value in zip(forms, astuple(pose), strict=True) if np.isfinite(value))
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.real import converters
-from benchmarks.real.contents import Contents
+from benchmarks.real.converters import Contents
 from calib_core.errors import InputError
 from calib_core.options import NoiseOptions
-
-__all__ = ["SETS", "RealSet"]
 
 
 @dataclass(frozen=True, slots=True)
