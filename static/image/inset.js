@@ -9,6 +9,8 @@ import { redraw } from "./image.js";
 
 /** It is as large as this part of the image's box, within these limits [CSS px]. */
 const [SHARE, LEAST, MOST] = [0.24, 96, 240];
+/** It is not needed while more than this part of the image is in sight. */
+const MUCH = 0.5;
 const canvas = make("canvas", "", []);
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 const isSwapped = () => document.body.classList.contains("space-large");
@@ -34,12 +36,14 @@ function go(event) {
 
 function draw() {
   const shown = state.shown;
-  canvas.hidden = !shown || (viewport.fitted && !isSwapped());
+  const seen = (viewport.width * viewport.height * viewport.ratio ** 2) / (viewport.imageWidth * viewport.imageHeight * viewport.scale ** 2);
+  canvas.hidden = !shown || (seen > MUCH && !isSwapped());
   if (!shown || canvas.hidden) return;
   const wide = Math.min(MOST, Math.max(LEAST, SHARE * viewport.width));
   const scale = (viewport.ratio * wide) / shown.width;
   [canvas.width, canvas.height] = [Math.round(shown.width * scale), Math.round(shown.height * scale)];
   canvas.style.width = `${canvas.width / viewport.ratio}px`;
+  canvas.classList.toggle("aside", !isSwapped() && viewport.left >= 0); // at the image's left edge nothing can be moved from below it
   pen.drawImage(shown.bitmap, 0, 0, canvas.width, canvas.height);
   const toInset = (/** @type {number} */ u, /** @type {number} */ v) => /** @type {const} */ ([(u + 0.5) * scale, (v + 0.5) * scale]);
   for (const { u_px, v_px, frame } of clicks()) {

@@ -8,7 +8,7 @@ import { offers } from "../base/offers.js";
 import { send } from "../base/socket.js";
 import { clickIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { dismiss } from "../image/dismissing.js";
-import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../image/geometry.js";
+import { lookAt, lookInto, pan, toCss, viewport, zoom, zoomAt } from "../image/geometry.js";
 import { fit, redraw } from "../image/image.js";
 import { goTo, pause } from "../time/player.js";
 
@@ -325,6 +325,8 @@ function settle() {
 /** What is shown of the image around a proposal: so many widths of the reflector, and at least this part of the image. */
 const WIDTHS = 9;
 const PART = 0.1;
+/** Under fingers it is shown at least as large as this [CSS px per image px]; image/inset.js shows the whole image. */
+const TOUCH_ZOOM = 3;
 /** Room below a proposal for the line on the frame, so that it does not cover the reflector [CSS px]. */
 const BELOW = 120;
 
@@ -339,6 +341,7 @@ function zoomInto({ row, place }) {
   const field = Math.max(WIDTHS * row.width_px, PART * viewport.imageWidth);
   const [u, v] = place.pixel_px;
   lookInto(u, v, field, field);
+  if (matchMedia("(pointer: coarse)").matches && zoom() < TOUCH_ZOOM) zoomAt(TOUCH_ZOOM / zoom(), ...toCss(u, v));
   lookAt(within(u, viewport.width, viewport.imageWidth), within(v, viewport.height, viewport.imageHeight));
   const below = document.documentElement.dataset.shape === "tall" ? 0 : BELOW; // there the line is below the image
   pan(0, Math.min(0, viewport.height - below - toCss(u, v)[1]));

@@ -120,6 +120,23 @@ def off_px(page: Driver, images: Images) -> float:
     return float(np.hypot(offer["place"]["pixel_px"][0] - u_px, offer["place"]["pixel_px"][1] - v_px))
 
 
+def test_under_fingers_a_proposal_is_three_times_as_large_beside_the_whole_image(
+    images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    page = open_page(proposing.url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.progress.done === 8")
+    page.page.tap("#next-placement")
+    guide(page)
+    assert page.value("__cocalib.zoom()") == pytest.approx(3.0, rel=1e-3)
+    x, y = page.place_of(*page.value("__cocalib.shownOffer().place.pixel_px"))
+    inset, line = page.page.locator("#inset").bounding_box(), page.page.locator("#guide").bounding_box()
+    assert inset is not None
+    assert line is not None
+    assert not (inset["x"] <= x <= inset["x"] + inset["width"] and inset["y"] <= y <= inset["y"] + inset["height"])
+    assert inset["y"] + inset["height"] <= line["y"], "the line is below it"
+    assert page.page.locator("#guide .primary").bounding_box()["height"] >= 40  # type: ignore[index]
+
+
 @pytest.mark.slow
 def test_twenty_placements_take_at_most_25_keys_and_clicks(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
