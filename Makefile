@@ -100,4 +100,4 @@ lock: dev  ## Update all pins, with hashes and without index URLs (needs uv).
 	@sh .ci/lock
 
 clean:  ## Remove the files created by make and the tests.
-	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist app/cocalib/site
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest $(VENV)-beyond .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist app/cocalib/site
