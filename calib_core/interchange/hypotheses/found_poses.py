@@ -83,8 +83,8 @@ class KeyHints:
 def words_of(key: object) -> tuple[str, ...]:
     """Split a key into lower-case words: T_cam_radar, radarToCamera and radar2cam alike, and rlc as r, lidar, to, cam."""
     if initials := _OF_INITIALS.fullmatch(str(key)[:200]):
-        first, last = initials[2].lower()
-        return initials[1].lower(), _INITIALS[first], "to", _INITIALS[last]
+        part, first, last = initials[0].lower()[:1], initials[0].lower()[1:2], initials[0].lower()[2:]
+        return part, _INITIALS[first], "to", _INITIALS[last]
     return tuple(word.lower() for word in _WORD.findall(_JOINED.sub(r"\1_", str(key)[:200])))
 
 

@@ -8,7 +8,7 @@ send one return per message, are read at once.
 import threading
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -90,6 +90,11 @@ class Scanned:
     damaged_chunks: int = 0
     fault: str = ""
     tried: int = 0
+
+    @property
+    def count(self) -> int:
+        """The number of messages."""
+        return sum(map(len, self.messages.values()))
 
     def unpacked(self, file: FileBytes, chunk: Chunk, *, where: str, checksum: int = 0) -> bytes:
         """Decompress a chunk as far as possible; record what is wrong with it."""
@@ -191,6 +196,25 @@ class ChunkedSource:
         """Return the locations of a channel's messages."""
         empty = np.zeros(0, dtype=np.int64)
         return self.indexes.get(channel_id, MessageIndex(empty, empty, empty))
+
+    def take(self, scan: Scanned, channels: Collection[Channel], *, tool: str, sound: bool = False) -> bool:
+        """Take what a scan of the whole file has found, with a warning; return whether there is a message to read.
+
+        Args:
+            scan: of the file.
+            channels: that it has found.
+            tool: the command that repairs such a file.
+            sound: whether the file just has no index; there is no warning then.
+        """
+        self.recovered, self.chunks, self.channels, self.indexes = True, scan.chunks, tuple(channels), {}
+        for channel in self.channels:
+            columns = np.array(scan.messages.get(channel.id, ()), dtype=np.int64).reshape(-1, 3)
+            if len(columns):
+                self.note_index(channel.id, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
+        unknown = scan.count - sum(map(len, self.indexes.values()))
+        if not sound or unknown:
+            self.warnings = (*self.warnings, _recovery_warning(self.path, scan, unknown=unknown, tool=tool))
+        return bool(self.indexes) or (sound and not unknown)
 
     def note_index(self, channel_id: int, index: MessageIndex) -> None:
         """Store the index of a channel.
@@ -530,27 +554,9 @@ class _Gather:
         return "" if self.lengths[row] >= 0 else f"chunk {chunk} ends before its messages do"
 
 
-def recovery_warning(
-    path: Path,
-    *,
-    messages: int,
-    lost_bytes: int,
-    tool: str,
-    damaged_chunks: int = 0,
-    fault: str = "",
-    unknown: int = 0,
-) -> DataWarning:
-    """Describe what was recovered by reading the whole file, and what was lost.
-
-    Args:
-        path: the file.
-        messages: number of messages recovered.
-        lost_bytes: number of bytes that could not be parsed.
-        tool: the command that repairs such a file.
-        damaged_chunks: number of compressed chunks that could not be fully decompressed.
-        fault: why the first of those could not.
-        unknown: number of messages of connections or channels that the file does not describe.
-    """
+def _recovery_warning(path: Path, scan: Scanned, *, unknown: int, tool: str) -> DataWarning:
+    """Describe what was recovered by reading the whole file, and what was lost."""
+    messages, damaged_chunks, lost_bytes = scan.count, scan.damaged_chunks, scan.lost_bytes
     parts = [
         f"{path.name} has no usable index (it was not closed properly, or is truncated or damaged): {messages} complete messages "
         "were recovered by reading the whole file"
@@ -558,7 +564,7 @@ def recovery_warning(
     if damaged_chunks:
         parts.append(
             f"{damaged_chunks} chunk{'s are' if damaged_chunks > 1 else ' is'} damaged, and everything after the damage in "
-            f"{'them' if damaged_chunks > 1 else 'it'} is lost ({fault})"
+            f"{'them' if damaged_chunks > 1 else 'it'} is lost ({scan.fault})"
         )
     if unknown:
         parts.append(f"{unknown} of the messages belong to topics that the file does not describe, and are skipped")

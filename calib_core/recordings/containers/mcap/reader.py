@@ -9,7 +9,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
-from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource, recovery_warning
+from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
 from calib_core.recordings.containers.mcap import records
 from calib_core.recordings.containers.mcap.recovery import scan_mcap
 from calib_core.recordings.containers.positioned_reads import FileStretch, MemoryStretch
@@ -205,29 +205,11 @@ class McapSource(ChunkedSource):
         """
         mcap = scan_mcap(self.file)
         self._private_bytes = mcap.private_bytes
-        self.chunks, self.channels, self.recovered = mcap.chunks, mcap.declarations.channels, True
-        self.indexes = {}
-        self._found = {channel: [np.array(entries, dtype=np.int64)] for channel, entries in mcap.messages.items()}
-        known = {channel.id for channel in self.channels}
-        count = sum(map(len, mcap.messages.values()))
-        unknown = sum(len(entries) for channel, entries in mcap.messages.items() if channel not in known)
-        sound = closed and mcap.ended and not (mcap.lost_bytes or mcap.damaged_chunks or unknown)
-        if not sound and count == unknown:
+        sound = closed and mcap.ended and not (mcap.lost_bytes or mcap.damaged_chunks)
+        if not self.take(mcap, mcap.declarations.channels, tool="mcap recover", sound=sound):
             raise self._damaged(len(records.MAGIC))
-        self._note_indexes()
-        if not sound:
-            warning = recovery_warning(
-                self.path,
-                messages=count,
-                lost_bytes=mcap.lost_bytes,
-                tool="mcap recover",
-                damaged_chunks=mcap.damaged_chunks,
-                fault=mcap.fault,
-                unknown=unknown,
-            )
-            self.warnings = (*self.warnings, warning)
-        if count < self._counted:
-            self.warnings = (*self.warnings, self._too_few(count))
+        if mcap.count < self._counted:
+            self.warnings = (*self.warnings, self._too_few(mcap.count))
 
     def _too_few(self, count: int) -> DataWarning:
         return DataWarning.reported(

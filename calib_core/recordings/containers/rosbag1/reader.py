@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource, recovery_warning
+from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
 from calib_core.recordings.containers.rosbag1.index import (
     CONNECTION,
     ChunkInfo,
@@ -21,7 +21,7 @@ from calib_core.recordings.containers.rosbag1.index import (
     read_tail,
 )
 from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
-from calib_core.recordings.containers.sources import Channel, MessageIndex
+from calib_core.recordings.containers.sources import Channel
 
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes
@@ -104,30 +104,10 @@ class Rosbag1Source(ChunkedSource):
     def _recover(self, start: int, fault: RecordingError) -> None:
         """Index a bag with a missing or damaged index by scanning all of it."""
         bag = scan_bag(self.file, start)
-        self.recovered = True
-        self.chunks = bag.chunks
-        channels = channels_of(bag)
-        self.channels = tuple(channels.values())
-        known = {number: entries for number, entries in bag.messages.items() if number in channels}
-        if not known:
+        if not self.take(bag, channels_of(bag).values(), tool="rosbag reindex"):
             raise RecordingError(
                 f"{fault}; all of its {self.size_bytes} bytes were searched without finding a complete message"
             )
-        self.indexes = {}
-        for connection, entries in known.items():
-            columns = np.array(entries, dtype=np.int64)
-            self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
-        count = sum(map(len, bag.messages.values()))
-        warning = recovery_warning(
-            self.path,
-            messages=count,
-            lost_bytes=bag.lost_bytes,
-            tool="rosbag reindex",
-            damaged_chunks=bag.damaged_chunks,
-            fault=bag.fault,
-            unknown=count - sum(map(len, known.values())),
-        )
-        self.warnings = (*self.file.warnings, warning)
 
     # -- opening
 
