@@ -89,9 +89,8 @@ def _same_layout(first: RadarLayout, definition: Definition) -> RadarLayout:
     same = definition.fields == first.definition.fields and definition.encoding == first.definition.encoding
     if same:
         return first
-    if isinstance(first, CloudLayout) and is_cloud(definition):
-        return replace(first, definition=definition, _known={})
-    if isinstance(first, ChannelCloudLayout) and is_channel_cloud(definition):
+    is_alike = {CloudLayout: is_cloud, ChannelCloudLayout: is_channel_cloud}.get(type(first))
+    if is_alike is not None and is_alike(definition):
         return replace(first, definition=definition)
     found = first.for_definition(definition) if isinstance(first, ListLayout | ArrayLayout) else None
     if found is None:

@@ -190,7 +190,7 @@ class RadarStream(ScanBlocks):
 
     def _with_plan(self, **changes: Any) -> "RadarStream":
         other = copy.copy(self)
-        other.layout, *rest = (layout.with_plan(replace(layout.plan, **changes)) for layout in self._layouts)
+        other.layout, *rest = (replace(layout, plan=replace(layout.plan, **changes)) for layout in self._layouts)
         other._layouts = (other.layout, *rest)
         other._read_of, other._lost_of = np.zeros((2, len(self.topic)), dtype=np.int32)
         ScanBlocks.__init__(other, self.times_ns)
@@ -257,7 +257,7 @@ class RadarStream(ScanBlocks):
     def claims(self, count: int) -> Returns:
         """Decode ranges and angles as given, and positions in the message's own axes, of at most count scans."""
         plan = self.layout.plan
-        layout = self.layout.with_plan(replace(plan, claiming=True, axes=plan.axes if plan.mount else None))
+        layout = replace(self.layout, plan=replace(plan, claiming=True, axes=plan.axes if plan.mount else None))
         places = np.unique(np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns))).astype(np.int64))
         first, last = self._first[places], np.minimum(self._last[places], self._first[places] + _CLAIMS_OF_A_SCAN)
         rows = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in zip(first, last, strict=True))])

@@ -74,10 +74,6 @@ class ArrayLayout:
         length = message.count(self.plan.position[0])
         return returns_from(self.plan, lambda name: message.numbers(name, length)[:count])
 
-    def with_plan(self, plan: ColumnPlan) -> "ArrayLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
-
     def for_definition(self, definition: Definition) -> "ArrayLayout | None":
         """Return the same layout for another file's definition; None if that lacks an array in use."""
         kind = dict(_scopes(definition, definition.type, ())).get(self.scope)
@@ -277,7 +273,7 @@ class ListLayout:
             f"only the list '{best.place.name}' is read; the message also has {', '.join(spare)}, "
             f"which can be chosen by naming columns with --map, such as --map x={spare[0]}.FIELD"
         )
-        return best.with_plan(replace(best.plan, notes=(*best.plan.notes, note)))
+        return replace(best, plan=replace(best.plan, notes=(*best.plan.notes, note)))
 
     @property
     def rank(self) -> tuple[bool, bool, bool, bool]:
@@ -330,10 +326,6 @@ class ListLayout:
         count = parent.count(self.place.path[-1])
         return count if self.count_field is None else min(count, max(0, parent.whole(self.count_field)))
 
-    def with_plan(self, plan: ColumnPlan) -> "ListLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
-
     def for_definition(self, definition: Definition) -> "ListLayout | None":
         """Return the same layout for another file's definition; None if that lacks the list or a column in use."""
         place = next((place for place in struct_lists(definition) if place.path == self.place.path), None)
@@ -355,7 +347,7 @@ def _list_at(
         return None
     known = find_decoder("list", (*numbers, *others)) is not None
     if not within.column_map:
-        first = plan_described("list", described(definition, place.element, numbers, _no_values), others)
+        first = plan_described("list", described(definition, place.element, numbers), others)
         if first is None or not first.looks_like_radar:
             return None
     parents = (
@@ -371,10 +363,6 @@ def _list_at(
         return None
     messages = len(samples.messages) if parents and samples else 0
     return ListLayout(definition, place, _with_place_assumption(plan, place, parents, counter, messages), counter)
-
-
-def _no_values(name: str) -> np.ndarray:
-    return np.zeros(0)
 
 
 def _sampled(parents: Sequence[Message], last: str, name: str, counter: str | None) -> np.ndarray:

@@ -43,10 +43,6 @@ class _Shape:
     plan: ColumnPlan
 
 
-def _no_known() -> dict[bytes, _Shape]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudLayout:
     """Reads PointCloud2. The field description is parsed once, then recognized by its bytes."""
@@ -54,7 +50,7 @@ class CloudLayout:
     definition: Definition
     plan: ColumnPlan
     lidar_like: bool
-    _known: dict[bytes, _Shape] = field(default_factory=_no_known)
+    _known: dict[bytes, _Shape] = field(default_factory=dict, init=False)
 
     one_per_message = False
 
@@ -137,10 +133,6 @@ class CloudLayout:
                 after = np.minimum(end + 8 + sizes, rows.shape[1] - 1)
                 return _unless_marked(returns, rows[np.arange(len(rows)), after] != 0, width), width
         return None
-
-    def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan, _known={})
 
     def _remember(self, block: bytes, shape: _Shape) -> None:
         if len(self._known) < 16:
@@ -368,10 +360,6 @@ class ChannelCloudLayout:
             return returns_from(self.plan, lambda name: columns[name])
         except KeyError as error:
             raise MessageError(f"a cloud lacks the channel {error} of the first cloud") from error
-
-    def with_plan(self, plan: ColumnPlan) -> "ChannelCloudLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
 
 
 def _channel_columns(message: Message) -> dict[str, np.ndarray]:

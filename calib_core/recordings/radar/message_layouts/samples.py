@@ -67,7 +67,10 @@ def leaf_names(definition: Definition, kind: str, prefix: str = "") -> tuple[lis
 
 
 def described(
-    definition: Definition, kind: str, names: Sequence[str], values: Callable[[str], np.ndarray]
+    definition: Definition,
+    kind: str,
+    names: Sequence[str],
+    values: Callable[[str], np.ndarray] = lambda name: np.zeros(0),
 ) -> list[DescribedColumn]:
     """Describe the numbers of a type.
 
@@ -75,7 +78,7 @@ def described(
         definition: of the message.
         kind: the type that has the fields.
         names: their dotted names.
-        values: returns the values of a name in a sample.
+        values: returns the values of a name in a sample; without it there are none.
     """
     columns = []
     for name in names:

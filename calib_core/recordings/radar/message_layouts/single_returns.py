@@ -1,7 +1,7 @@
 """Read the messages of drivers that send one return per message, and find where each scan begins."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -103,10 +103,6 @@ class PointLayout:
             moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
         return moved
 
-    def with_plan(self, plan: ColumnPlan) -> "PointLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
-
     def view(self, rows: np.ndarray) -> np.ndarray:
         """View raw rows (n, dtype.itemsize) as records."""
         return np.ascontiguousarray(rows).view(self.dtype)[:, 0]
@@ -136,7 +132,7 @@ def _point_plan(
     definition: Definition, samples: Samples, names: Sequence[str], strings: Sequence[str], stated: StatedReading
 ) -> ColumnPlan | None:
     """Plan the columns of single returns; those of other sensors' messages, such as a vehicle's pose, are not planned."""
-    columns = described(definition, definition.type, names, _no_values)
+    columns = described(definition, definition.type, names)
     first = None if stated.column_map else plan_described("point", columns, strings, stated=stated)
     if first is not None and first.decoder:
         return first
@@ -148,10 +144,6 @@ def _point_plan(
         definition, definition.type, names, lambda name: np.array([message.number(name) for message in messages])
     )
     return plan_described("point", columns, strings, definition.remarks.get(definition.type, ""), stated)
-
-
-def _no_values(name: str) -> np.ndarray:
-    return np.zeros(0)
 
 
 def _known_snr(returns: Returns) -> Returns:
