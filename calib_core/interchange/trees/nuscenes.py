@@ -1,6 +1,7 @@
 """The joints of nuScenes' tables: each record of calibrated_sensor.json is a sensor in the ego frame, named by sensor.json."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -61,7 +62,7 @@ def read_nuscenes(poses: Content, source: str, sensors: Content | None) -> TreeP
         for joint in found:
             record = records[id(joint)]
             frame = channel if len(found) == 1 else f"{channel}@{str(record.get('token'))[:8]}"
-            joints.append(_named_joint(joint, frame))
+            joints.append(replace(joint, child=frame))
             known.append(_sensor(record, frame, source))
     return TreePart("nuscenes", tuple(joints), tuple(known), notes=(_NOTE,))
 
@@ -90,12 +91,6 @@ def pose_of(record: Mapping[str, Any], *, source: str, place: str = "") -> Writt
 def _line_of(record: Mapping[str, Any], text: str) -> int | None:
     at = text.find(f'"{record.get("token")}"')
     return text.count("\n", 0, at) + 1 if at >= 0 else None
-
-
-def _named_joint(joint: Joint, frame: str) -> Joint:
-    if joint.written is None:
-        return Joint(joint.parent, frame, None, joint.place, problem=joint.problem)
-    return Joint.posed(joint.parent, frame, joint.written, joint.place)
 
 
 def _sensor(record: Mapping[str, Any], frame: str, source: str) -> Sensor:

@@ -17,7 +17,6 @@ from calib_core.lens_models.registry import written_lens
 from calib_core.measurements import TimeNs, time_parts
 from calib_core.recordings.containers.sources import ChannelNotes, StoredChannel
 
-Ros1Compression = Literal["none", "bz2", "lz4"]
 Ros2Container = Literal["mcap", "sqlite3"]
 RADAR_SCAN_TYPE = "ti_mmwave_rospkg/msg/RadarScan"
 RADAR_SCAN_DEFINITION = """\
@@ -130,13 +129,12 @@ class RecordedMessage:
     body: MessageBody
 
 
-def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compression: Ros1Compression = "none") -> Path:
+def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage]) -> Path:
     """Write a ROS 1 bag and return its path.
 
     Args:
         path: of a file that does not exist yet.
         messages: in the order to write them; recorders write by receive time.
-        compression: "lz4" is written in a form that ROS itself cannot read; "none" and "bz2" are readable everywhere.
 
     Raises:
         RecordingError: the file exists.
@@ -145,10 +143,7 @@ def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compressi
 
     _refuse_existing(path)
     build = MessageBuilder(1)
-    writer = Writer(path)
-    if compression != "none":
-        writer.set_compression(Writer.CompressionFormat[compression.upper()])
-    with writer:
+    with Writer(path) as writer:
         _write_all(
             messages,
             lambda topic, kind: writer.add_connection(topic, kind, typestore=build.typestore),

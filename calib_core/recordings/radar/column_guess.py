@@ -271,7 +271,7 @@ def choose(
     matched |= _columns_of_one_position(first, ("x", "y", "z")) | _columns_of_one_position(first, ("vx", "vy", "vz"))
     numbered = [one for one in matches if one.meaning.numbered and one.quantity == "azimuth" and not one.meaning.sigma]
     azimuth = matched.get("azimuth")
-    second = [one for one in numbered if one.meaning.second or one.meaning.kind != "vague"]
+    second = [one for one in numbered if one.meaning.kind != "vague" or (azimuth is not None and one.meaning.second)]
     has_first = azimuth is not None or {"x", "y"} <= matched.keys()
     others = tuple(one.name for one in second if has_first and one is not azimuth)
     stating = any(one.mapped and one.quantity in _POLAR for one in matches)
@@ -294,7 +294,8 @@ def _matches(
     """Return the columns that --map and the registry choose, and of other quantities those whose names mean something."""
     given = {one.column: one for one in stated.column_map}
     taken = {value.quantity for value in given.values()}
-    own = {} if decoder is None else {name.lower(): what for what, name in decoder.columns.items() if what not in taken}
+    ruled = {} if decoder is None else {name.lower(): what for what, name in decoder.columns.items()}
+    own = {name: what for name, what in ruled.items() if what not in taken}
     taken.update(own.values())
     if not taken.isdisjoint(_POLAR[:2]) and taken.isdisjoint("xy"):
         taken |= set("xyz")  # it is said what to use
@@ -306,7 +307,7 @@ def _matches(
         if one or quantity:
             quantity = one.quantity if one else quantity
             bare = quantity.removeprefix("sigma_")
-            named = quantity in own.values() or (meaning is not None and meaning.quantity == bare)
+            named = bare in (ruled.get(column.name.lower()), meaning.quantity if meaning else "")
             unit = _unit(one.unit) if one and one.unit else meaning.unit if meaning and named else None
             meaning = Meaning(bare, -1, unit, sigma=bare != quantity)
             column = replace(column, values=one.sign * column.values) if one else column
@@ -556,8 +557,15 @@ class _UnitInference:
         if finding is proven or (finding.certain and not self.of_table and all(one.named for one in group)):
             return units, finding.why, None
         self._refuse_either(group, finding)
-        text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
-        return units, "assumed", self._unit_assumption("length-unit", text, group, finding.unit, sides)
+        return (
+            units,
+            "assumed",
+            self._unit_assumption("length-unit", self._by_values(names, finding), group, finding.unit, sides),
+        )
+
+    def _by_values(self, names: str, finding: "Finding") -> str:
+        """Say which unit is assumed."""
+        return f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
 
     def _refuse_either(self, group: Sequence[ColumnMatch], finding: "Finding") -> None:
         """Refuse a table whose values fit two units alike."""
@@ -693,7 +701,7 @@ class _UnitInference:
         if finding.certain and not (self.of_table and finding.unit.name == "rad"):
             return finding.unit, finding.why, None
         self._refuse_either(angles, finding)
-        text = f"{_are(names)} taken as {finding.unit.name} ({finding.why}); the {self.noun} does not state the unit"
+        text = self._by_values(names, finding)
         return finding.unit, "assumed", self._unit_assumption("angle-unit", text, angles, finding.unit)
 
     def _azimuth_sign(self, azimuth: ColumnMatch, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
@@ -803,7 +811,7 @@ class _UnitInference:
             finding = _speed_unit(group[0].column.values, integer=group[0].column.integer)
             unit, why = finding.unit, "assumed"
             confirm = _map(group[0], unit) if doppler and unit.flag else CONFIRM_ALL
-            text = f"{_are(', '.join(names))} taken as {unit.name} ({finding.why}); the {self.noun} does not state the unit"
+            text = self._by_values(", ".join(names), finding)
             assumptions = (*assumptions, _assume("speed-unit", text, confirm, ("doppler",)))
         quantity, sign = ("doppler", "either: only its size matters") if doppler else ("velocity", "as the position's")
         return replace(

@@ -137,10 +137,9 @@ def test_a_recording_is_never_overwritten(recording, folder):
         write_recording(recording, folder)
 
 
-@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
-def test_a_bag_reads_back_whatever_its_compression(tmp_path, compression):
+def test_a_bag_reads_back(tmp_path):
     body = RadarReturnMessage(TimeNs(7), "radar", 0, 1.0, -2.0, 0.5, 2.25, -0.5, 12, -63.5, 21.0)
-    path = write_ros1_bag(tmp_path / "one.bag", [RecordedMessage("/radar", TimeNs(9), body)], compression=compression)
+    path = write_ros1_bag(tmp_path / "one.bag", [RecordedMessage("/radar", TimeNs(9), body)])
     [(time, message)] = _messages([path], "/radar")
     assert time == 9
     assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)
