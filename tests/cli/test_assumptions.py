@@ -34,6 +34,7 @@ def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib, paths):
     assert [row["confirmed"] for row in summary["assumptions"]] == [False, False]
 
 
+@pytest.mark.slow
 def test_solve_waits_until_everything_is_confirmed_or_stated(cocalib, paths, sample, tmp_path):
     clicks = ("--clicks", sample / "clicks.json")
     answer = cocalib("solve", *paths, *clicks, "--out", tmp_path / "a.json")

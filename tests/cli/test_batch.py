@@ -45,6 +45,7 @@ def test_from_a_folder_to_a_table(folder, cocalib):
     assert statuses == {"clicked": "solved", "not-clicked": "refused", "broken": "failed"}
 
 
+@pytest.mark.slow
 def test_what_is_done_is_not_done_again(folder, cocalib):
     command, clicked = ("batch", folder / "sessions.toml", "--out", folder / "out"), folder / "van" / "clicked"
     assert cocalib(*command).code == 0
@@ -58,6 +59,7 @@ def test_what_is_done_is_not_done_again(folder, cocalib):
     assert (folder / "a.json").read_bytes() == first
 
 
+@pytest.mark.slow
 def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(folder, cocalib):
     manifest, out, clicks = folder / "sessions.toml", folder / "out", folder / "van" / "clicked" / "clicks.json"
     whole = clicks.read_text()

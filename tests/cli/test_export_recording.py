@@ -22,6 +22,7 @@ def exported(solved_sample: Path, bags: tuple[Path, Path], tmp_path_factory: pyt
     return out
 
 
+@pytest.mark.slow
 def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
     cocalib, sample, solved_sample, exported, tmp_path
 ):
@@ -40,6 +41,7 @@ def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
     assert all(before <= after for before, after in pairwise(times))
 
 
+@pytest.mark.slow
 def test_a_foreign_layout_is_not_written_over(cocalib, bags, solved_sample, tmp_path):
     (tmp_path / "new.foxglove-layout.json").write_text("mine")
     typed = ("export", solved_sample, "--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap")
@@ -81,6 +83,7 @@ def test_nothing_half_written_stays(stop, cocalib, bags, solved_sample, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["mcap", "tf2", "into"])
 def test_an_assumed_meaning_is_said_with_every_export(to, cocalib, bags, solved_sample, tmp_path):
     content = json.loads(solved_sample.read_text()) | {"evidence": "imported_assumed", "warnings": []}

@@ -52,6 +52,7 @@ def write_shifted(folder: Path, board: np.ndarray, count: int) -> None:
         cv2.imwrite(str(folder / f"flat{index:02d}.png"), np.clip(noisy, 0, 255).astype(np.uint8))
 
 
+@pytest.mark.slow
 def test_real_images_give_a_lens_as_good_as_opencv_s_with_everything_written(cocalib, left, tmp_path, project_root):
     out, report, rectified = tmp_path / "camera.yaml", tmp_path / "lens.html", tmp_path / "rectified"
     answer = cocalib("intrinsics", *left, *_BOARD, "--json", "--out", out, "--report", report, "--rectified", rectified)
@@ -76,6 +77,7 @@ def test_real_images_give_a_lens_as_good_as_opencv_s_with_everything_written(coc
     assert len(list(rectified.glob("*.png"))) == len(left)
 
 
+@pytest.mark.slow
 def test_planted_images_are_named_and_no_good_one_is_dropped(cocalib, right, tmp_path):
     planted = {f"blurred-{path.name}": cv2.GaussianBlur(cv2.imread(str(path)), (0, 0), 2.5) for path in right[:3]}
     planted["mirrored.png"] = cv2.imread(str(right[4]))[:, ::-1]
@@ -144,6 +146,7 @@ def test_images_without_a_board_say_so(cocalib, tmp_path):
     assert "None of 3 images" in answer.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "size", "words"),
     [

@@ -30,6 +30,7 @@ def error_of(out: Path, sample: Path) -> tuple[float, float]:
     return float(np.linalg.norm(error[:3])), float(np.degrees(np.linalg.norm(error[3:])))
 
 
+@pytest.mark.slow
 def test_a_unit_of_the_speed_that_cannot_change_the_pose_is_a_note(cocalib, cases, sample, tmp_path):
     out = tmp_path / "c.json"
     paths = (cases / "07-speed-unit-unstated" / "radar", sample / "camera.bag")
@@ -76,6 +77,7 @@ def test_pairs_in_the_spellings_of_other_tools_give_the_pose(cocalib, cases, sam
     assert ("assumed" in {one.code for one in calibration.warnings}) == (case.startswith("60"))
 
 
+@pytest.mark.slow
 def test_a_radar_whose_clock_is_another_time_scale_is_named_and_can_be_corrected(cocalib, cases, sample, tmp_path):
     out, bags = tmp_path / "c.json", (cases / "09-clock-37-s" / "radar.bag", sample / "camera.bag")
     answer = cocalib("solve", *bags, "--clicks", sample / "clicks.json", "--out", out)

@@ -103,6 +103,7 @@ def solved(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Solved:
     return files
 
 
+@pytest.mark.slow
 def test_a_calibration_that_nobody_confirmed_says_so_and_comes_again_from_its_clicks(
     cocalib, recording, solved, tmp_path
 ):

@@ -87,6 +87,7 @@ def test_json_of_our_own_has_the_same_limits():
             json_form(text, list[object] if text == "\ud800" else list[int])
 
 
+@pytest.mark.slow
 def test_rows_of_any_size_are_read_one_by_one(tmp_path):
     path = tmp_path / "rows.json"
     path.write_text(json.dumps([{"n": number, "of": [1.5]} for number in range(80_000)]))

@@ -94,6 +94,7 @@ def test_a_wrong_focal_length_looks_like_a_scale_of_the_azimuths():
         assert found.facts["value"] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset_m", [(0.0, 0.15, 0.0), (0.0, -0.15, 0.0), (0.12, 0.0, 0.0)])
 def test_clicks_beside_the_phase_centre_contradict_a_measured_camera(offset_m):
     contradicted = 0
@@ -229,6 +230,7 @@ def test_an_azimuth_scale_of_three_percent_is_found_and_the_truth_is_covered(noi
     assert np.abs(off).max() < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "errors",
     [
@@ -260,6 +262,7 @@ def test_scales_are_not_biased_by_the_noise_of_the_positions(options):
     assert (np.abs(np.mean(values, axis=0)) < 0.5 * np.mean(sigmas, axis=0)).all()
 
 
+@pytest.mark.slow
 def test_many_pairs_on_flat_ground_settle_on_one_elevation_scale():
     """On flat ground an elevation scale is nearly a shift of the camera: plain Newton steps overshot, and never settled."""
     crowded = replace(FIELD, separation_m=0.0)

@@ -39,6 +39,7 @@ def _boxes(*places: tuple[ActorLabel, float, float, float]) -> dict[str, Box]:
     return {box.track: box for box in true_boxes(_standing(simulate(WALK), *places)).frames[3].boxes}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("radar", "container"), [("awr1843", "ros1"), ("imaging", "ros1"), ("awr1843", "mcap")])
 def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(radar, container, tmp_path):
     recording = simulate(replace(WALK, radar=radar, width_px=64, height_px=64, camera_rate_hz=1.0))
@@ -160,6 +161,7 @@ def test_who_carries_the_reflector_and_passers_by_have_tracks_of_their_own():
     assert tracks <= named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "beyond_m"), [("cars-near", 12.0), ("cars-far", 45.0)])
 def test_the_radar_sees_cars_of_both_directions_at_their_ranges(preset, beyond_m):
     options = PRESETS[preset]

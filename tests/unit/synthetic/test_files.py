@@ -64,6 +64,7 @@ def _cloud(message: Any) -> np.ndarray:
     return np.frombuffer(message.data.tobytes(), dtype="<f4").reshape(message.width, len(message.fields))
 
 
+@pytest.mark.slow
 def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_restart_in_each_scan(scans, folder):
     messages = [message for _, message in _messages([folder / "radar.bag"], "/ti_mmwave/radar_scan")]
     assert [m.point_id for m in messages] == [i for scan in scans for i in range(len(scan))]
@@ -145,6 +146,7 @@ def test_a_bag_reads_back(tmp_path):
     assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)
 
 
+@pytest.mark.slow
 def test_a_folder_without_ros_has_dated_images_and_every_return(recording, scans, frames, tmp_path):
     write_recording(recording, tmp_path, ("csv",))
     images = sorted((tmp_path / "recording_csv" / "camera").iterdir())
@@ -156,6 +158,7 @@ def test_a_folder_without_ros_has_dated_images_and_every_return(recording, scans
     np.testing.assert_allclose([float(row[3]) for row in rows], azimuths_deg, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_second_camera_is_written_into_the_same_recording(tmp_path):
     recording = simulate(replace(OPTIONS, camera_rate_hz=1.0, other_camera=True))
     other = recording.other_camera

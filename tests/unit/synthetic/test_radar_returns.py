@@ -184,6 +184,7 @@ def test_near_and_far_scans_may_follow_each_other_in_turn():
     assert np.diff(times[order]).min() > 0.3 * np.median(np.diff(far.times.header_ns))
 
 
+@pytest.mark.slow
 def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
     near_and_far = replace(QUIET, clutter="scene", defects=RadarDefects(near_and_far=True))
     messages = list(radar_messages(simulate(replace(near_and_far, placements=3)), 1))

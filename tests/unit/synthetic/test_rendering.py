@@ -78,6 +78,7 @@ def _before_green(rig: Rig) -> FrameRenderer:
     return FrameRenderer(scene_named("field"), rig, still)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
 @pytest.mark.parametrize("place_m", [(2.0, 0.0), (2.1, 0.8), (2.6, -1.1)])
 def test_the_sheets_in_the_image_meet_at_the_truth_pixel(model, place_m):

@@ -20,6 +20,7 @@ def session() -> SimulatedRecording:
     return simulate(SHORT)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session):
     again, other = simulate(SHORT), simulate(replace(SHORT, seed=4))
     assert np.array_equal(session.scans.points_radar_m, again.scans.points_radar_m)
@@ -59,6 +60,7 @@ def test_clutter_stays_and_a_walking_person_moves(session):
     assert np.abs(gap.doppler_mps).max() > 0.5
 
 
+@pytest.mark.slow
 def test_elevation_is_measured_far_worse_than_range_and_azimuth():
     session = simulate(
         replace(SHORT, placements=20, clutter="none", person=False, defects=RadarDefects(azimuth_bins=0))
@@ -155,6 +157,7 @@ def test_an_option_out_of_range_is_refused_by_name(changes, text):
         replace(SHORT, **changes)
 
 
+@pytest.mark.slow
 def test_traffic_leaves_placements_and_clicks_where_they_are(session):
     busy = simulate(replace(SHORT, traffic=Traffic(walkers=2)))
     assert np.array_equal(busy.points_radar_m, session.points_radar_m)

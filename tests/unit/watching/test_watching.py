@@ -120,6 +120,7 @@ class _Street:
         return self.street.scans.between(start, end)
 
 
+@pytest.mark.slow
 def test_stretches_hold_traffic_image_and_scans_of_half_a_minute():
     recording = _Street()
     found = list(stretches(recording, Watched(TRUE_POSE, CAMERA, RadarErrors()), recording.street.boxes))

@@ -43,6 +43,7 @@ def folder(recording: SimulatedRecording, tmp_path_factory: pytest.TempPathFacto
     return folder
 
 
+@pytest.mark.slow
 def test_the_board_is_where_the_truth_says(recording):
     stage = recording.stage
     assert stage.waving is not None
@@ -81,6 +82,7 @@ def test_the_reflector_is_fetched_after_the_board_is_put_away(recording):
     assert np.linalg.norm(story.at(story.lead_s + 1e-3).person.place_m) > 1.0
 
 
+@pytest.mark.slow
 def test_nothing_in_the_recording_tells_of_the_lens(folder):
     with open_recording([folder / "recording_mcap"]) as recording:
         topics = {topic.name for topic in recording.topics}

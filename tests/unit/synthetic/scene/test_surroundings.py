@@ -112,6 +112,7 @@ def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns():
         assert _seen(session.scans, position) == pytest.approx(shown.mean(), abs=0.15)
 
 
+@pytest.mark.slow
 def test_passers_by_cross_the_scene_and_some_stop():
     session = simulate(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(passers_by=3)))
     story = session.stage.story
