@@ -210,12 +210,14 @@ function drawReport() {
 
 /** Show how Rerun is opened. @param {{command: string, is_installed: boolean, opens_window: boolean}} offer */
 function drawRerun({ command, is_installed: isInstalled, opens_window: opensWindow }) {
-  head.replaceChildren(make("span", "", "Images, returns and pairs over time, in the Rerun viewer"));
+  const [words, line] = !isInstalled
+    ? ["rerun-sdk is not installed on this server. This installs it:", "pip install 'cocalib[rerun]'"]
+    : opensWindow
+      ? ["Images, returns and pairs over time. Download the file, or open a window with the calibration that the format json saves:", command]
+      : ["Images, returns and pairs over time. This server can open no window: download the file, and open it on your computer:", "rerun view.rrd"];
+  head.replaceChildren(make("span", "", words));
   drawFields({});
-  const install = "# rerun-sdk is not installed where cocalib runs\npip install 'cocalib[rerun]'\n";
-  const away = "# no window can be opened where cocalib runs: download the file, and on your computer\nrerun view.rrd\n";
-  const here = `# in a window, with the calibration as "json" saves it; or download the file\n${command}\n`;
-  show(isInstalled ? (opensWindow ? here : away) : install, "view.rrd", false);
+  show(`${line}\n`, "view.rrd", false);
   save.disabled = !isInstalled;
   for (const part of [before, notes, side]) part.replaceChildren();
 }

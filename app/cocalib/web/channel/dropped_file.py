@@ -41,7 +41,7 @@ def sorted_file(file: FileDropped, *, has_camera: bool) -> Dropped:
     kinds = sorted(readers, key=lambda kind: kind == "calibration") if not has_camera else readers
     kind = next((kind for kind in kinds if readers[kind]()), None)
     if kind is None:
-        raise InputError(f"{name} is no camera, clicks, calibration, boxes or recording that cocalib knows")
+        raise InputError(f"{name} is no camera, clicks, calibration, boxes or recording of a known format")
     return Dropped(kind)
 
 
