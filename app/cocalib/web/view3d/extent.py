@@ -1,12 +1,11 @@
 """How far the data reach, range rings to suit, and viewpoints from which all of it is in sight. In the radar frame, all pure."""
 
-import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values, Vector3
+from calib_core.arrays import Points2, Points3, Values, Vector3
 from cocalib.web.messages.incoming import Viewpoint
 
 _MOST = 0.98
@@ -17,7 +16,7 @@ _RINGS = 6
 _BEYOND = 1.1
 """The range reaches this much beyond the farthest reflector or the farthest of most returns."""
 _STEPS = 50
-"""Sides of the box are whole steps of the range divided by this: a recording that grows does not change the view every second."""
+"""The field has corners at whole steps, this part of the range: a recording that grows does not move the view every second."""
 _FILLED = 0.8
 """The data fill this share of the view along one axis."""
 _ENOUGH = 0.5
@@ -36,20 +35,22 @@ class Extent:
 
     Attributes:
         range_m: the farthest.
-        low_m: the corner of the box to look at that is farthest back, right and down; the radar is in the box.
-        high_m: the opposite corner.
+        outline_m: corners (x, y) of a convex field around what is to be looked at; the radar is in it.
+        low_m: height of the lowest.
+        high_m: height of the highest.
     """
 
     range_m: float
-    low_m: tuple[float, float, float]
-    high_m: tuple[float, float, float]
+    outline_m: tuple[tuple[float, float], ...]
+    low_m: float
+    high_m: float
 
     def corners(self) -> Points3:
-        """Return the corners (8, 3) of the box."""
-        return np.array(list(itertools.product(*zip(self.low_m, self.high_m, strict=True))))
+        """Return the corners (n, 3) of the field at both heights."""
+        return np.array([(x_m, y_m, z_m) for x_m, y_m in self.outline_m for z_m in (self.low_m, self.high_m)])
 
 
-UNKNOWN = Extent(12.0, (0.0, -8.0, -1.0), (12.0, 8.0, 1.0))
+UNKNOWN = Extent(12.0, ((0.0, 0.0), (12.0, -8.0), (12.0, 8.0)), -1.0, 1.0)
 """What is assumed before anything is known."""
 
 
@@ -76,7 +77,7 @@ class Stand:
 
 
 def extent_of(points_radar_m: Points3, weights: Values, reflectors_radar_m: Points3) -> Extent:
-    """Return a range that holds 98 % of the static returns by weight, and a box of the reflectors, or without any of the returns.
+    """Return a range that holds 98 % of the static returns by weight, and a field around the reflectors, or else the returns.
 
     Args:
         points_radar_m: (n, 3) static returns.
@@ -95,15 +96,15 @@ def extent_of(points_radar_m: Points3, weights: Values, reflectors_radar_m: Poin
     placed = reflectors_radar_m[np.isfinite(reflectors_radar_m).all(axis=1)]
     far_m = max([_quantile(ranges, weight, _MOST), *np.linalg.norm(placed, axis=1).tolist()])
     range_m = max(_NEAREST_M, float(f"{_BEYOND * far_m:.2g}"))
-    heights_m = [_quantile(points[:, 2], weight, share) for share in _MOST_HEIGHTS]
-    box_m = [placed[:, axis].tolist() for axis in (0, 1)]
+    low_m, high_m = (_quantile(points[:, 2], weight, share) for share in _MOST_HEIGHTS)
+    low_m, high_m = min([0.0, low_m, *placed[:, 2].tolist()]), max([0.0, high_m, *placed[:, 2].tolist()])
+    field_m = placed[:, :2]
     if not len(placed):
-        box_m = [[_quantile(points[:, axis], weight, share) for share in (1.0 - _MOST, _MOST)] for axis in (0, 1)]
-    box_m.append([*heights_m, *placed[:, 2].tolist()])
-    low_m, high_m = np.array([[min([0.0, *side]), max([0.0, *side])] for side in box_m]).T
-    steps_m = np.array([range_m / _STEPS, range_m / _STEPS, 0.1])
-    low_m, high_m = np.floor(low_m / steps_m - 0.5) * steps_m, np.ceil(high_m / steps_m + 0.5) * steps_m
-    return Extent(range_m, _rounded(low_m), _rounded(high_m))
+        sides = [[_quantile(points[:, axis], weight, share) for axis in (0, 1)] for share in (1.0 - _MOST, _MOST)]
+        field_m = points[((points[:, :2] >= sides[0]) & (points[:, :2] <= sides[1])).all(axis=1), :2]
+    step_m = range_m / _STEPS
+    outline_m = _outline(np.round(np.concatenate([np.zeros((1, 2)), field_m]) / step_m) * step_m)
+    return Extent(range_m, outline_m, math.floor(10.0 * low_m) / 10.0, (math.floor(10.0 * high_m) + 1.0) / 10.0)
 
 
 def ring_ranges_m(range_m: float) -> tuple[float, ...]:
@@ -116,7 +117,7 @@ def ring_ranges_m(range_m: float) -> tuple[float, ...]:
 
 
 def fitted_stand(extent: Extent, viewpoint: Viewpoint, field_of_view_rad: float, aspect: float) -> Stand:
-    """Return where to stand so that the whole box is in sight, as near as possible, and no strip.
+    """Return where to stand so that the whole field is in sight, as near as possible, and no strip.
 
     Args:
         extent: to be seen.
@@ -134,7 +135,7 @@ def fitted_stand(extent: Extent, viewpoint: Viewpoint, field_of_view_rad: float,
 
 
 def _nearest_stand(extent: Extent, direction: Vector3, up: Vector3, tangents: Values) -> Stand:
-    """Return the nearest stand from which the box fills no more than its share of the view.
+    """Return the nearest stand from which the field fills no more than its share of the view.
 
     With camera coordinates x to the right, y up and z ahead, a corner is in sight if |x - x0| <= tan(half the angle) (z - z0),
     and so for y; the largest z0 that leaves room for all corners follows directly.
@@ -153,9 +154,11 @@ def _nearest_stand(extent: Extent, direction: Vector3, up: Vector3, tangents: Va
     return Stand(position @ axes, target @ axes, up, np.ptp(seen, axis=0) / 2.0)
 
 
-def _rounded(corner_m: Values) -> tuple[float, float, float]:
-    x_m, y_m, z_m = np.round(corner_m, 6).tolist()
-    return x_m, y_m, z_m
+def _outline(points_m: Points2) -> tuple[tuple[float, float], ...]:
+    """Return the corners of the convex hull of points (n, 2)."""
+    import cv2
+
+    return tuple((float(x_m), float(y_m)) for x_m, y_m in cv2.convexHull(points_m.astype(np.float32))[:, 0])
 
 
 def _quantile(values: Values, weights: Values, share: float) -> float:

@@ -124,7 +124,7 @@ class Colouring:
         if self.colour == "doppler":
             return -self.fastest_mps, self.fastest_mps
         if self.colour == "height":
-            return self.extent.low_m[2], self.extent.high_m[2]
+            return self.extent.low_m, self.extent.high_m
         return self.snr_db if self.colour == "amplitude" else None
 
 

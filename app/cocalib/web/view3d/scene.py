@@ -42,10 +42,10 @@ FIELD_OF_VIEW_RAD = 0.75
 _MOST_ELLIPSOIDS = 200
 _LARGE_PX = 30.0  # as in static/base/colours.js: a colour means the same after every click
 """More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
-_MARGIN = 1.15
+_MARGIN = 1.4
 """An image hides what is so much wider than it: a placement has a ring."""
-_AXES_SHARE, _FRUSTUM_SHARE, _RETURN_SHARE = 0.03, 0.035, 0.005
-"""Sizes of the radar's axes, the camera's frustum and a return of middle strength, as shares of the viewer's distance."""
+_AXES_SHARE, _FRUSTUM_SHARE, _RETURN_SHARE = 0.045, 0.04, 0.005
+"""Sizes of the radar's axes, the camera's frustum and a usual return, as shares of the viewer's distance from them."""
 _DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
 _USUAL_ASPECT, _SAME_ASPECT = 1.4, 0.02
 
@@ -127,11 +127,11 @@ class TabScene:
         with self._client.atomic():
             camera.up_direction = tuple(stand.up)
             camera.position, camera.look_at = tuple(stand.position_m), tuple(stand.look_at_m)
-            length_m, size_m = _AXES_SHARE * stand.distance_m, _RETURN_SHARE * stand.distance_m
+            away_m, size_m = float(np.linalg.norm(stand.position_m)), _RETURN_SHARE * stand.distance_m
             self._axes.axes_length, self._axes.axes_radius, self._axes.origin_radius = (
-                np.array([1.0, 0.024, 0.04]) * length_m
+                np.array([1.0, 0.024, 0.04]) * _AXES_SHARE * away_m
             )
-            self._frustum.scale = _FRUSTUM_SHARE * stand.distance_m
+            self._frustum.scale = _FRUSTUM_SHARE * away_m
             self._returns.resize(size_m)
             self._window.point_size, self._chosen.point_size = 0.5 * size_m, 1.8 * size_m
         self._viewpoint, self._stood_at = viewpoint, stand.position_m

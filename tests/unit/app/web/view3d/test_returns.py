@@ -12,7 +12,7 @@ from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.returns import SIZES, Colouring, map_colours, size_classes
 
 NAN = float("nan")
-EXTENT = Extent(20.0, (0.0, -10.0, -1.0), (20.0, 10.0, 3.0))
+EXTENT = Extent(20.0, ((0.0, 0.0), (20.0, 10.0)), -1.0, 3.0)
 BACKGROUND = {False: np.array([13, 16, 20]), True: np.array([233, 236, 240])}
 
 

@@ -234,7 +234,7 @@ def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn, viewpoint):
 def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_moved_it(drawn):
     drawn.scene.show(sight())
     before = np.array(drawn.camera.position)
-    road = Extent(200.0, (0.0, -140.0, -1.0), (200.0, 140.0, 4.0))
+    road = Extent(200.0, ((0.0, 0.0), (200.0, -140.0), (200.0, 140.0)), -1.0, 4.0)
     drawn.scene.show(replace(sight(), colouring=coloured(road)))
     stands = np.array(drawn.camera.position)
     assert np.linalg.norm(stands) > 5 * np.linalg.norm(before)
@@ -274,9 +274,9 @@ def test_axes_and_frustum_keep_their_size_on_the_screen(drawn):
     seen = []
     for range_m in (10.0, 300.0):
         drawn.scene.show(
-            replace(sight(), colouring=coloured(Extent(range_m, (0.0, -range_m, -1.0), (range_m, range_m, 1.0))))
+            replace(sight(), colouring=coloured(Extent(range_m, ((0.0, -range_m), (range_m, range_m)), -1.0, 1.0)))
         )
-        distance_m = np.linalg.norm(np.subtract(drawn.camera.look_at, drawn.camera.position))
+        distance_m = np.linalg.norm(drawn.camera.position)
         seen.append([drawn.node("/camera").scale / distance_m, drawn.node("/radar").axes_length / distance_m])
     assert seen[0] == pytest.approx(seen[1])
 
