@@ -170,7 +170,7 @@ def name_text(name: str | Path) -> str:
 
 
 def encodable(value: Any) -> Any:
-    """Return strings, and lists and dicts of them, with everything that UTF-8 cannot hold shown as `\udcff`."""
+    r"""Return strings, and lists and dicts of them, with everything that UTF-8 cannot hold shown as `\udcff`."""
     if isinstance(value, str):
         return value.encode("utf-8", "backslashreplace").decode()
     if isinstance(value, dict):

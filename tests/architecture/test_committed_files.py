@@ -1,5 +1,6 @@
 """What committed files must and must not contain."""
 
+import ast
 import re
 import subprocess
 from pathlib import Path
@@ -101,3 +102,11 @@ def test_nothing_in_the_code_unpickles_or_evaluates(committed_texts):
         if name.endswith(".py") and name.startswith(("app/", "calib_core/", "benchmarks/")) and pattern.search(text)
     ]
     assert found == []
+
+
+def test_docstrings_can_be_written_as_utf_8(committed_texts):
+    """Python 3.13 compiles no module with one that cannot."""
+    for name, text in committed_texts.items():
+        for node in ast.walk(ast.parse(text)) if name.endswith(".py") else ():
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                (ast.get_docstring(node) or "").encode()

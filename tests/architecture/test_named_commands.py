@@ -13,7 +13,7 @@ from cocalib.cli.commands import COMMANDS
 from cocalib.cli.tyro_hook import flags_of
 from cocalib.cli.usage import read_command
 
-PROSE = {"again", "boxes-1", "cookie", "reads", "therefore", "wrote"}
+PROSE = {"again", "boxes-1", "cookie", "knows", "reads", "runs", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
 
 _TRANSFORM_PUBLISHER = ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")
