@@ -104,6 +104,8 @@ def _assemble(folder: Path) -> None:
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
     for name in ("images", "schemas"):
         shutil.copytree(docs / name, folder / name)
+    tables = Path("benchmarks", "accuracy", "tables")
+    shutil.copytree(_ROOT / tables, folder / tables)
     for name in ("CITATION.cff", "LICENSE", "pyproject.toml"):
         shutil.copy(_ROOT / name, folder / name)
     shutil.copy(_ROOT / "static" / "icon.svg", folder / "icon.svg")

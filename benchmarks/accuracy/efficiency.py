@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks.accuracy.cases import Bound, Case, bound_of, draw
-from benchmarks.accuracy.figures import Measured, at_most, column, ratio, rmse, tally
+from benchmarks.accuracy.figures import MET, MISSED, Measured, at_most, column, ratio, rmse, tally
 from benchmarks.accuracy.methods import PEERS, available, solve_ours
 from benchmarks.accuracy.rows import Figures, Kept, Row, Section
 from benchmarks.simulated_pairs import SimulatedPairs
@@ -81,6 +81,7 @@ def section(kept: Kept) -> Section:
     for case in _CASES:
         ours, name = kept.get(f"ours-{case.key}", ()), f"{case.noise} {case.pairs}"
         peers = kept.get(_peers_key(case), ())
+        own = _ratios(ours[: len(peers)] or ours)
         methods = [("ours", "", ours), *((peer, f"{peer} ", peers) for peer in PEERS if peers and available(peer))]
         for method, prefix, trials in methods:
             if len(trials) < 2:
@@ -98,10 +99,9 @@ def section(kept: Kept) -> Section:
             if method == "ours":
                 words = zip(("rotation", "position"), ratios, verdicts, strict=True)
                 judged += [(f"{name}, {what}", f"{one.value:.2f}", verdict) for what, one, verdict in words]
-                best = ratios
             else:
-                better = all(not one.value < own.value for one, own in zip(ratios, best, strict=True))
-                beaten.append((f"{method}, {name}", " / ".join(map(_short, ratios)), "met" if better else "**missed**"))
+                better = all(not theirs.value < one.value for theirs, one in zip(ratios, own, strict=True))
+                beaten.append((f"{method}, {name}", " / ".join(map(_short, ratios)), MET if better else MISSED))
     claims = (
         tally(f"RMSE at most {_AIM:g} times the Cramer-Rao bound", judged),
         tally(f"no other method nearer, {_COMPARED} pairs, in rotation or position", beaten),

@@ -15,7 +15,7 @@ aim and the verdict of each, in a file beside the benchmark. Real pairs and reco
 ## What a user may conclude
 
 - **The stated 95 % holds** if radar, lens, clicks and measured position are wrong by no more than the options state, with
-  12 pairs or more spread over the image, about one in ten of them wrong, and right axes, units and intrinsics.
+  12 pairs or more spread over the image, about one in ten of them wrong, and right axes, units and intrinsics{held}.
 {outside}
 - **Measure the camera position.** {tape}
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
@@ -50,16 +50,31 @@ def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "m
         command: what wrote the page.
     """
     claims = [claim for section in sections.values() for claim in section.claims]
-    outside = [f"  - {section.title} {'; '.join(section.outside)}." for section in sections.values() if section.outside]
+    outside = [
+        f"  - {section.title.partition(':')[0]}: {'; '.join(section.outside)}."
+        for section in sections.values()
+        if section.outside
+    ]
     head = _HEAD.format(
         command=command,
-        outside="\n".join(["  It does not, and fewer are inside, in these rows:", *outside] if outside else []),
+        held=_held(sections),
+        outside="\n".join(["  It does not in these rows, with so many inside:", *outside] if outside else []),
         tape=_tape(sections),
         missed=sum(claim.verdict == MISSED for claim in claims),
         aims=len(claims),
         seeds=_FRESH.format(commit=commit[:8]) if commit else _FIXED,
     )
     return "\n".join([head, *(_section(name, section) for name, section in sections.items())])
+
+
+def _held(sections: Mapping[str, Section]) -> str:
+    """Say how many sets are inside, without and with smooth errors."""
+    shown = [sections["shared"].claims[0].measured] if "shared" in sections else []
+    smooth = sections["smooth"].claims if "smooth" in sections else ()
+    shown += [
+        f"{claim.measured} with {claim.aim.partition(':')[0]}" for claim in smooth if claim.aim.endswith("inside")
+    ]
+    return f": inside are {', '.join(shown)} angle errors" if shown else ""
 
 
 def _tape(sections: Mapping[str, Section]) -> str:

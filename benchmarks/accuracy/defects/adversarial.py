@@ -1,5 +1,6 @@
 """Pairs with the defects that were seen to make confident answers wrong: how many are silently wrong?"""
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -24,6 +25,8 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Row, Section
 
 _TRIALS, _GAUGE_TRIALS, _SESSIONS = 24, 12, 4
 _HIGHEST_SHARE = 0.001
+_DRAWN = re.compile(r", (ti|imaging|awr)\w*, \d+, .*")
+"""What a finding says of radar, pairs and camera position."""
 _CONTRADICTORY = LEVELS.index("contradictory")
 ALL: Mapping[str, Adversary] = {one.key: one for one in (*ADVERSARIES_OF_PAIRS, *ADVERSARIES_OF_SCANS)}
 
@@ -70,7 +73,7 @@ def section(kept: Kept) -> Section:
     judged = [(one, kept[_key(one)]) for one in ALL.values() if kept.get(_key(one))]
     for adversary, trials in judged:
         held = share(inside(trials))
-        finding = adversary.finding.split(", ti")[0].split(", imaging")[0].split(", awr")[0]
+        finding = _DRAWN.sub("", adversary.finding)
         if low(held) and not adversary.always_wrong:
             outside.setdefault(finding, []).append(held.value)
         warned = np.mean([bool(codes_in(one) & set(adversary.codes)) for one in trials])
