@@ -104,7 +104,8 @@ def main() -> int:
     arguments.tables.mkdir(parents=True, exist_ok=True)
     for name, section in measured.items():
         (arguments.tables / f"{name}.csv").write_text(table(section.rows), encoding="utf-8")
-    text = page(measured, commit="" if fresh is None else fresh.commit, command=command)
+    counts = sum(map(len, kept.values())), sum(row.trials for row in everything)
+    text = page(measured, commit="" if fresh is None else fresh.commit, command=command, counts=counts)
     arguments.page.write_text(text, encoding="utf-8")
     return 0
 

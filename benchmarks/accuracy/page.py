@@ -18,9 +18,9 @@ aim and the verdict of each, in a file beside the benchmark. Real pairs and reco
   12 pairs or more spread over the image, about one in ten of them wrong, and right axes, units and intrinsics{held}.
 {outside}
 - **Measure the camera position.** {tape}
-- **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
-  alike, a cropped image. The verdict says that it assumes none of them. A measured position shows the first two; a turn, such
-  as that of a cropped image, it shows with an imaging radar at best.
+- **Some errors no pair can show:** clicks that are all beside the point that the radar sees, and elevations that are all
+  wrong alike. The verdict says that it assumes neither; a measured position shows most of both, with an imaging radar all. An
+  image that was cropped after its intrinsics were measured is named where its principal point is far from the middle.
 - **{missed} of {aims} aims are missed.** They are in bold below, with the rows that miss them.
 
 ## How it was measured
@@ -41,13 +41,20 @@ _FIXED = "The draws are those of fixed seeds, which development may have seen."
 _FRESH = "The draws come from a commit's hash, {commit}, after the code was written: nobody had seen them."
 
 
-def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "make bench-accuracy") -> str:
+def page(
+    sections: Mapping[str, Section],
+    *,
+    commit: str = "",
+    command: str = "make bench-accuracy",
+    counts: tuple[int, int] = (0, 0),
+) -> str:
     """Return the page in Markdown; what was not measured is left out.
 
     Args:
         sections: the measured questions by the name of their table.
         commit: whose hash gave the seeds; empty for the fixed ones.
         command: what wrote the page.
+        counts: sets that were measured, and those of a whole run.
     """
     claims = [claim for section in sections.values() for claim in section.claims]
     outside = [
@@ -62,9 +69,14 @@ def page(sections: Mapping[str, Section], *, commit: str = "", command: str = "m
         tape=_tape(sections),
         missed=sum(claim.verdict == MISSED for claim in claims),
         aims=len(claims),
-        seeds=_FRESH.format(commit=commit[:8]) if commit else _FIXED,
+        seeds=f"{_FRESH.format(commit=commit[:8]) if commit else _FIXED} {_counted(*counts)}",
     )
     return "\n".join([head, *(_section(name, section) for name, section in sections.items())])
+
+
+def _counted(measured: int, whole: int) -> str:
+    cut = f" of {whole:,}: the run was cut, after about the same share of each row" if measured < whole else ""
+    return f"These are {measured:,} sets{cut}."
 
 
 def _held(sections: Mapping[str, Section]) -> str:

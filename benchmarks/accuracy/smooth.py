@@ -149,7 +149,7 @@ def section(kept: Kept) -> Section:
             held, name = share(flags_inside(trials)), f"{case.noise} {'free' if case.tape_m is None else 'tape'}"
             aims = {"aim inside": f"{_AIMS[part]:g} %", "inside": at_least(held, _AIMS[part])}
             rows.append({"smooth": f"{part:.0%}", "row": name} | coverage_cells(trials) | aims)
-            outside += [f"{part:.0%} smooth, {name} ({held.value:.0f} %)"] if low(held) else []
+            outside += [f"{100.0 * part:.0f} % smooth, {name} ({held.value:.0f} %)"] if low(held) else []
             ratios = [] if part else [stated_over_rmse(trials, *names) for names in ERRORS]
             sharp += [(name, f"{one.value:.2f}", at_most(one, _SHARPNESS)) for one in ratios]
         trials = [one for case in cases for one in kept.get(shared_key(case), ())]
@@ -167,7 +167,9 @@ def _claims(part: float, trials: Sequence[Figures]) -> list[Claim]:
     held, relied, aim = share(flags_inside(trials)), sold(trials), _AIMS[part]
     of_sold = share(flags_inside(trials)[relied])
     return [
-        Claim(f"{part:.0%} smooth: {aim:g} % inside", f"{held.percent} of {len(trials)}", at_least(held, aim)),
+        Claim(
+            f"{100.0 * part:.0f} % smooth: {aim:g} % inside", f"{held.percent} of {len(trials)}", at_least(held, aim)
+        ),
         Claim("of those good or usable: 95 %", f"{of_sold.percent} of {int(relied.sum())}", at_least(of_sold, 95.0)),
         silent_claim("none of them silent", trials),
     ]

@@ -133,6 +133,7 @@ def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatc
         if not re.search("written by `(python|make)", text[:900], re.IGNORECASE):
             words += len(re.sub(r"^```[^\n]*\n\$ (.*?)^```", "", text, flags=re.MULTILINE | re.DOTALL).split())
     assert 20_000 < words <= 35_000
+    assert len((project_root / "docs" / "accuracy.md").read_text(encoding="utf-8").split()) <= 3_000
 
 
 _REMARK = re.compile(r"( \.\.\.)?(\s{3,}\S.*|\s+#.*|)$")

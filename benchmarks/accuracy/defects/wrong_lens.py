@@ -148,7 +148,7 @@ def section(kept: Kept) -> Section:
         covered += [(name, f"{one.value:.0f} %", within(one, 93.0, 97.0)) for one in shares]
         outside += [f"lens: {name} ({held.value:.0f} %)"] if low(held) else []
         over = _over_given(case, trials, kept)
-        harmless += [(name, f"{one.value:.2f}", at_most(one, 1.0)) for one in over]
+        harmless += [(name, f"{one.value:.3f}", at_most(one, 1.0)) for one in over]
         off = ratio(focal, np.full(len(focal), _FOCAL_AIM))
         if case.refined and case.alone:
             focal_off.append((name, f"{100.0 * _FOCAL_AIM * off.value:.2f} %", at_most(off, 1.0)))
