@@ -42,6 +42,9 @@ export async function content(reading) {
   }
 }
 
+/** A message of 4 MB is the limit: a larger file is not sent [bytes]. */
+export const LARGEST_FILE = 2_800_000;
+
 /** The bytes of a file in base 64; null if they cannot be read. @param {Blob} file @returns {Promise<string|null>} */
 export function inBase64(file) {
   return new Promise((ready) => {

@@ -6,6 +6,7 @@ import { make } from "../base/notices.js";
 import { clicks, emit, on, state } from "../base/state.js";
 import { lookAt, toImage, viewport } from "./geometry.js";
 import { redraw } from "./image.js";
+import { outlined } from "./marks.js";
 
 /** It is as large as this part of the image's box, within these limits [CSS px]. */
 const [SHARE, LEAST, MOST] = [0.24, 96, 240];
@@ -47,22 +48,9 @@ function draw() {
   pen.drawImage(shown.bitmap, 0, 0, canvas.width, canvas.height);
   const toInset = (/** @type {number} */ u, /** @type {number} */ v) => /** @type {const} */ ([(u + 0.5) * scale, (v + 0.5) * scale]);
   for (const { u_px, v_px, frame } of clicks()) {
-    pen.beginPath();
-    pen.arc(...toInset(u_px, v_px), (frame === shown.index ? 3 : 1.5) * viewport.unit, 0, 2 * Math.PI);
-    outline(ink.click);
+    outlined(pen, ink.click, 1.5, () => pen.arc(...toInset(u_px, v_px), (frame === shown.index ? 3 : 1.5) * viewport.unit, 0, 2 * Math.PI));
   }
   if (isSwapped()) return;
   const [[left, top], [right, bottom]] = [toInset(...toImage(0, 0)), toInset(...toImage(viewport.width, viewport.height))];
-  pen.beginPath();
-  pen.rect(left, top, right - left, bottom - top);
-  outline(ink.ring);
-}
-
-/** @param {string} colour */
-function outline(colour) {
-  for (const [style, width] of /** @type {[string, number][]} */ ([[ink.edge, 3.5], [colour, 1.5]])) {
-    pen.strokeStyle = style;
-    pen.lineWidth = width * viewport.unit;
-    pen.stroke();
-  }
+  outlined(pen, ink.ring, 1.5, () => pen.rect(left, top, right - left, bottom - top));
 }

@@ -1,6 +1,6 @@
 /** Files dropped anywhere on the page: the server says what one is, and the room that takes such files gets it. */
 
-import { inBase64 } from "../base/asking.js";
+import { inBase64, LARGEST_FILE } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
@@ -10,8 +10,8 @@ import { give } from "../opening/opening.js";
 import { takeFile } from "../review/compare.js";
 import { takeBoxes } from "../review/evaluating.js";
 
-/** A message of 4 MB is the limit; of a larger file, its beginning says whether it is a recording [bytes]. */
-const [LARGEST, BEGINNING] = [2_800_000, 65_536];
+/** Of a larger file than can be sent, so much says whether it is a recording [bytes]. */
+const BEGINNING = 65_536;
 /** @type {Record<import("../messages.js").Dropped["kind"], (file: File) => void>} */
 const TAKERS = {
   camera: give,
@@ -38,7 +38,7 @@ export function startDropping() {
 /** Ask what a file is; before a recording is open, only a camera's can be used. @param {File} file */
 async function ask(file) {
   if (!state.recording) return give(file);
-  const isWhole = file.size <= LARGEST;
+  const isWhole = file.size <= LARGEST_FILE;
   const content = await inBase64(isWhole ? file : file.slice(0, BEGINNING));
   if (content === null) return toast(`${file.name} cannot be read by the browser; a folder cannot be dropped.`, "Choose the file itself.");
   dropped = file;

@@ -1,6 +1,6 @@
 /** Two solutions side by side: chosen here, compared by the server, drawn over the image with two shapes. */
 
-import { inBase64 } from "../base/asking.js";
+import { inBase64, LARGEST_FILE } from "../base/asking.js";
 import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { tell } from "../base/socket.js";
@@ -13,8 +13,6 @@ import { visible } from "./review.js";
 
 const A_COLOUR = "#4aaaeb";
 const B_COLOUR = "#f09e42";
-/** A larger file is not sent: no calibration is that large, and a message of 4 MB is the limit [bytes]. */
-const LARGEST_FILE = 2_800_000;
 /** @type {[Kind, string][]} */
 const KINDS = [
   ["now", "now"],

@@ -4,7 +4,7 @@
  */
 
 import { register, withImages } from "../base/actions.js";
-import { inBase64 } from "../base/asking.js";
+import { inBase64, LARGEST_FILE } from "../base/asking.js";
 import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
@@ -21,8 +21,6 @@ const find = make("button", "second", "Find what moves");
 const picker = make("input", "", []);
 const WIDE = 92;
 const HIGH = 26;
-/** A larger file is not sent: a message of 4 MB is the limit [bytes]. */
-const LARGEST_FILE = 2_800_000;
 /** @type {Panel|null} */
 let panel = null;
 

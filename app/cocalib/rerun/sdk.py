@@ -16,13 +16,18 @@ _OFFLINE: Mapping[str, str] = {
 _FORCED = "FORCE_RERUN_ANALYTICS"
 
 
+def is_installed() -> bool:
+    """Return whether rerun-sdk is."""
+    return find_spec("rerun") is not None
+
+
 def require_sdk() -> None:
     """Refuse to go on without rerun-sdk.
 
     Raises:
         InputError: it is not installed.
     """
-    if find_spec("rerun") is None:
+    if not is_installed():
         raise InputError(
             "this command needs rerun-sdk, which is not installed (there is none for Intel Macs): pip install 'cocalib[rerun]'; "
             "cocalib export --to mcap does without it. A video of the overlay needs none either: cocalib show --out FILE.mp4"

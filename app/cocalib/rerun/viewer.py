@@ -185,13 +185,18 @@ class _Handler(BaseHTTPRequestHandler):
         """Print nothing."""
 
 
+def has_display(environment: Mapping[str, str], platform: str = sys.platform) -> bool:
+    """Return whether a window can be opened."""
+    return not platform.startswith("linux") or bool(environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY"))
+
+
 def require_display(environment: Mapping[str, str], platform: str = sys.platform) -> None:
     """Refuse to go on where no window can be opened.
 
     Raises:
         InputError: there is no display.
     """
-    if platform.startswith("linux") and not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")):
+    if not has_display(environment, platform):
         raise InputError(
             "no window can be opened here: there is no display (DISPLAY and WAYLAND_DISPLAY are not set, as over ssh). Use "
             "--web for a viewer in the browser, or write a file with cocalib show ... --out FILE.rrd and open it on a "

@@ -248,19 +248,12 @@ class _Downloads:
 
     def _rerun(self, _query: str) -> Reply:
         """Say how the recording with its calibration is opened in Rerun on this machine."""
-        from cocalib.rerun import require_display, require_sdk
-
-        def can(require: Callable[[], None]) -> bool:
-            try:
-                require()
-            except InputError:
-                return False
-            return True
+        from cocalib.rerun import has_display, is_installed
 
         def make(_text: str) -> Reply:
             paths = shlex.join(name_text(str(path.absolute())) for path in self._recording.paths)
             command = f"cocalib show {paths} --calibration calibration.json"
-            offer = RerunOffer(command, can(require_sdk), can(partial(require_display, os.environ)))
+            offer = RerunOffer(command, is_installed(), has_display(os.environ))
             return _reply(msgspec.json.encode(offer), _TYPES[".json"])
 
         return self._of_calibration(make)
