@@ -45,6 +45,19 @@ export async function content(reading) {
 /** A message of 4 MB is the limit: a larger file is not sent [bytes]. */
 export const LARGEST_FILE = 2_800_000;
 
+/** A hidden field in which a file is chosen. @param {(file: File) => unknown} take @param {string} label @returns {HTMLInputElement} */
+export function fileField(take, label) {
+  const field = make("input", "", []);
+  field.type = "file";
+  field.hidden = true;
+  field.setAttribute("aria-label", label);
+  field.onchange = async () => {
+    if (field.files?.[0]) await take(field.files[0]);
+    field.value = "";
+  };
+  return field;
+}
+
 /** The bytes of a file in base 64; null if they cannot be read. @param {Blob} file @returns {Promise<string|null>} */
 export function inBase64(file) {
   return new Promise((ready) => {

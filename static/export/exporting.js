@@ -4,7 +4,7 @@
  */
 
 import { register, withImages } from "../base/actions.js";
-import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
+import { ask, BROKE_OFF, content, fileField, saveFile } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
@@ -291,13 +291,7 @@ function keep(change) {
   }
 }
 
-const field = make("input", "", []);
-field.type = "file";
-field.accept = ".json,application/json";
-field.onchange = async () => {
-  if (field.files?.[0]) await takeClicks(field.files[0]);
-  field.value = "";
-};
+const field = fileField(takeClicks, "Clicks file");
 
 /** Add the clicks of a file. @param {File} file */
 export async function takeClicks(file) {

@@ -4,7 +4,7 @@
  */
 
 import { register } from "../base/actions.js";
-import { inBase64 } from "../base/asking.js";
+import { fileField, inBase64 } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send, tell, unconfirmed } from "../base/socket.js";
@@ -224,10 +224,7 @@ function askRadar(message) {
 
 function askIntrinsics() {
   strip.hidden = false;
-  const input = make("input", "", "");
-  input.type = "file";
-  input.hidden = true;
-  input.onchange = () => input.files?.[0] && give(input.files[0]);
+  const input = fileField(give, "Camera file");
   const pick = make("button", "chip", "Choose file…");
   pick.onclick = () => input.click();
   const calibrate = make("button", "chip", "Calibrate…");
@@ -286,10 +283,7 @@ function drawTopics({ choices, draft, redraw }, which) {
 
 /** The intrinsics: those in use, the recording's, those beside it, or a file. @param {Tools} tools */
 function drawIntrinsics({ choices, draft, redraw, give }) {
-  const input = make("input", "", "");
-  input.type = "file";
-  input.hidden = true;
-  input.onchange = () => input.files?.[0] && give(input.files[0]);
+  const input = fileField(give, "Camera file");
   const pick = make("button", "drop", draft.file ? `${draft.file.name}: drop or choose another file` : "Drop a camera file anywhere, or choose one… (camera_info YAML, OpenCV YAML or XML, Kalibr, JSON)");
   pick.onclick = () => input.click();
   /** @type {[Draft["intrinsics"], string, string, boolean][]} */

@@ -1,6 +1,6 @@
 /** Two solutions side by side: chosen here, compared by the server, drawn over the image with two shapes. */
 
-import { inBase64, LARGEST_FILE } from "../base/asking.js";
+import { fileField, inBase64, LARGEST_FILE } from "../base/asking.js";
 import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { tell } from "../base/socket.js";
@@ -44,7 +44,7 @@ const rows = make("table", "", []);
 const verdict = make("p", "verdict", "");
 const slider = make("input", "", []);
 const blending = make("div", "blend", []);
-const picker = make("input", "", []);
+const picker = fileField(takeFile, "Calibration file to compare with");
 
 export function startCompare() {
   addLayer("compared", drawCompared);
@@ -52,10 +52,6 @@ export function startCompare() {
   const choose = make("button", "", "File…");
   choose.dataset.hint = "Compare with a calibration file of any format, also by dropping it on the page.";
   choose.onclick = () => picker.click();
-  picker.type = "file";
-  picker.hidden = true;
-  picker.setAttribute("aria-label", "Calibration file to compare with");
-  picker.onchange = () => picker.files?.[0] && takeFile(picker.files[0]);
   box.append(head, make("div", "choice", [side("a", "A"), side("b", "B"), choose, picker]), verdict, rows, blending);
   rows.setAttribute("aria-label", "Difference between A and B");
   verdict.setAttribute("role", "status");

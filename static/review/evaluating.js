@@ -4,7 +4,7 @@
  */
 
 import { register, withImages } from "../base/actions.js";
-import { inBase64, LARGEST_FILE } from "../base/asking.js";
+import { fileField, inBase64, LARGEST_FILE } from "../base/asking.js";
 import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
@@ -18,7 +18,7 @@ const page = /** @type {HTMLElement} */ (document.getElementById("page-evaluate"
 const figures = make("section", "acc", []);
 const about = make("p", "acc-about", "");
 const find = make("button", "second", "Find what moves");
-const picker = make("input", "", []);
+const picker = fileField(takeBoxes, "File of boxes");
 const WIDE = 92;
 const HIGH = 26;
 /** @type {Panel|null} */
@@ -35,13 +35,6 @@ export function startEvaluating() {
   find.dataset.hint = "Boxes around whatever moves before a camera that stands still.";
   load.onclick = chooseBoxes;
   find.onclick = findMoving;
-  picker.type = "file";
-  picker.hidden = true;
-  picker.setAttribute("aria-label", "File of boxes");
-  picker.onchange = async () => {
-    if (picker.files?.[0]) await takeBoxes(picker.files[0]);
-    picker.value = "";
-  };
   figures.setAttribute("aria-label", "What the boxes say");
   page.append(make("div", "box-files", [load, find, picker]), about, figures);
   on(["theme"], draw);
