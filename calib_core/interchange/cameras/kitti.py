@@ -1,4 +1,4 @@
-"""KITTI's calib_cam_to_cam.txt: K, D and size of each camera, and its rectified image."""
+"""KITTI's cameras: calib_cam_to_cam.txt with K, D and size of each and of its rectified image; P0 to P3 of a frame's file."""
 
 import re
 
@@ -23,7 +23,7 @@ def _keyed(content: str | bytes) -> dict[str, dict[str, str]]:
 
 
 def _recognizes(content: str | bytes) -> bool:
-    return any({"K", "D"} <= set(values) or "P_rect" in values for values in _keyed(content).values())
+    return any({"K", "D"} <= set(values) or {"P_rect", "P"} & set(values) for values in _keyed(content).values())
 
 
 def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
@@ -34,10 +34,18 @@ def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
             distortion = _numbers(values, "D", number, source)
             found.append(FoundCamera(number, "", matrix, distortion, _size(values, "S", number, source)))
         if "P_rect" in values:
-            p = _numbers(values, "P_rect", number, source, 12)
-            matrix = (*p[0:3], *p[4:7], *p[8:11])
+            matrix = _left_part(values, "P_rect", number, source)
             found.append(FoundCamera(f"rect_{number}", "pinhole", matrix, (), _size(values, "S_rect", number, source)))
-    return tuple(found)
+        elif "P" in values and "K" not in values:
+            found.append(FoundCamera(f"P{number}", "pinhole", _left_part(values, "P", number, source), (), None))
+    same = len({camera.matrix_px for camera in found}) == 1 and all(camera.name.startswith("P") for camera in found)
+    return tuple(found[:1] if same else found)
+
+
+def _left_part(values: dict[str, str], key: str, number: str, source: str) -> tuple[float, ...]:
+    """Return the camera matrix K of a projection K [I | t]."""
+    p = _numbers(values, key, number, source, 12)
+    return (*p[0:3], *p[4:7], *p[8:11])
 
 
 def _numbers(

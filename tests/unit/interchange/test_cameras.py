@@ -192,6 +192,17 @@ def test_a_projection_of_three_rows_of_four_is_a_camera_matrix():
     np.testing.assert_allclose(read_camera(text).matrix_px, K)
 
 
+def test_the_projections_of_a_frame_of_kitti_are_one_rectified_camera_if_they_are_alike():
+    alike = "P0: 800 0 320 0 0 800 240 0 0 0 1 0\nP2: 800 0 320 44.8 0 800 240 0.2 0 0 1 0.003\nR0_rect: 1 0 0 0 1 0 0 0 1\n"
+    camera = read_camera(alike, "calib/01047.txt", image_size_px=(640, 480))
+    assert (camera.model, camera.width_px) == ("pinhole", 640)
+    assert camera.matrix_px.tolist() == [[800.0, 0.0, 320.0], [0.0, 800.0, 240.0], [0.0, 0.0, 1.0]]
+    other = alike.replace("P2: 800", "P2: 790")
+    assert read_camera(other, name="P2", image_size_px=(640, 480)).matrix_px[0, 0] == 790.0
+    with pytest.raises(InputError, match="P0"):
+        read_camera(other, image_size_px=(640, 480))
+
+
 def test_the_camera_of_astyx_is_found_among_its_sensors():
     radar = {"sensor_uid": "radar_6455", "calib_data": {"T_to_ref_COS": np.eye(4).tolist()}}
     camera = {"sensor_uid": "camera_front", "calib_data": {"K": [[700, 0, 320], [0, 700, 240], [0, 0, 1]]}}
