@@ -71,7 +71,7 @@ def test_a_page_whose_formats_did_not_come_asks_for_them_again(
     user.reload()
     page.until("__cocalib.state.shown")
     user.keyboard.press("e")
-    expect(user.locator(f"{DIALOG} .formats [role=option]")).to_have_count(2)  # the clicks and the report
+    expect(user.locator(f"{DIALOG} .formats [role=option]")).to_have_count(3)  # the clicks, the report and Rerun
     expect(user.locator(f"{DIALOG} .reason")).not_to_contain_text("Asking")
     down.clear()  # taking the route away could leave a request without an answer
     user.keyboard.press("Escape")

@@ -385,8 +385,8 @@ def test_edges_are_as_long_as_a_square(board):
         (("9x", 22.0), "inner corners"),
         (("1x6", 22.0), "inner corners"),
         (("3x2", 22.0), "too few corners"),
-        (("9x6", 0.0), "side of a square in millimetres"),
-        (("9x6", float("nan")), "side of a square in millimetres"),
+        (("9x6", 0.0), "side of a square in millimeters"),
+        (("9x6", float("nan")), "side of a square in millimeters"),
         (("2x2", 22.0, "charuco"), "squares along a row"),
     ],
 )
