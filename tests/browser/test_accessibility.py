@@ -140,6 +140,7 @@ def test_the_image_and_its_marks_are_told_in_words(page: Driver, truth: Any) -> 
         page.until(f"Number(document.activeElement.getAttribute('aria-valuenow')) !== {before}")
 
 
+@pytest.mark.slow
 def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 5)
     user = page.page

@@ -72,6 +72,7 @@ def test_the_calibration_is_judged_by_boxes_of_a_file_and_around_what_moves(
     assert acc(page) > 20
 
 
+@pytest.mark.slow
 def test_the_sheet_needs_no_mouse_and_fits_every_window(
     open_page: Callable[..., Driver], street_server: RunningServer, walk: StreetRecording
 ) -> None:

@@ -342,6 +342,7 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
         expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(page.said(row["message"]))
 
 
+@pytest.mark.slow
 def test_a_contradictory_calibration_is_saved_only_after_a_tick(page: Driver, truth: Any, tmp_path: Path) -> None:
     halved = [{**one, "pixel_px": [0.5 * value for value in one["pixel_px"]]} for one in truth["placements"]]
     page.load_sample({**truth, "placements": halved})

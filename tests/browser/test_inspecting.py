@@ -35,6 +35,7 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
             assert "messages were recovered" in box
 
 
+@pytest.mark.slow
 def test_assumptions_are_listed_until_the_user_confirms_them(
     open_page: Callable[..., Driver], project_root: Path, tmp_path: Path
 ) -> None:

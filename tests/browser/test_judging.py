@@ -218,6 +218,7 @@ def test_no_sentence_is_said_twice_and_the_first_screen_has_few_words(
     assert {state: twice for state, twice in ear.found.items() if twice} == {}
 
 
+@pytest.mark.slow
 def test_a_wrong_focal_length_is_said_once_and_wholly_and_the_lens_is_one_press_away(
     open_page: Callable[..., Driver], sample: Recording, tmp_path: Path, truth: Any
 ) -> None:

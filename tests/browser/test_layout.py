@@ -88,6 +88,7 @@ def out_of_reach(page: Driver, *selectors: str) -> Any:
     )
 
 
+@pytest.mark.slow
 def test_everything_is_in_the_window_or_a_tab_away_at_any_size_whatever_the_names(page: Driver) -> None:
     page.page.click("#menu-button")
     page.page.click("#theme")

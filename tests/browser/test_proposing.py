@@ -200,6 +200,7 @@ def enter_does_nothing_else(page: Driver) -> None:
     page.until("__cocalib.state.cross")
 
 
+@pytest.mark.slow
 def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
@@ -225,6 +226,7 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
     assert left(page) == before
 
 
+@pytest.mark.slow
 def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switched_off(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
@@ -267,6 +269,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     assert page.view["clicks"] == []
 
 
+@pytest.mark.slow
 def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:

@@ -164,6 +164,7 @@ def hidden_and_enlarged(page: Driver) -> None:
     assert page.value("document.getElementById('space').clientHeight") > 150
 
 
+@pytest.mark.slow
 def test_the_camera_view_equals_the_image(solved: Driver, workspace: Workspace, sample: Recording) -> None:
     outcome = workspace.session.outcome
     assert isinstance(outcome, Calibration)

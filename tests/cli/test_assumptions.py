@@ -18,6 +18,7 @@ def paths(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return vendor_sample(project_root / "sample_data" / "rooftop", tmp_path_factory.mktemp("vendor"))
 
 
+@pytest.mark.slow
 def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib, paths):
     answer = cocalib("info", *paths)
     assert answer.code == 0

@@ -25,6 +25,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_from_a_folder_to_a_table(folder, cocalib):
     manifest = folder / "found.toml"
     assert "3 sessions written to" in cocalib("batch", manifest, "--init", folder).out
@@ -81,6 +82,7 @@ def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(folder, co
     assert rows == {"VAN": "solved", "b": "missing"}
 
 
+@pytest.mark.slow
 def test_a_pose_that_nobody_must_use_is_weak_and_not_exported(folder, cocalib):
     command, clicks = (
         ("batch", folder / "sessions.toml", "--out", folder / "out"),

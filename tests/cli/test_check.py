@@ -26,6 +26,7 @@ def moved(solved: Path, tmp_path: Path) -> Path:
     return tmp_path / "moved.txt"
 
 
+@pytest.mark.slow
 def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib, solved, moved, tmp_path):
     differs = cocalib("check", moved, "--against", solved)
     assert differs.code == 1

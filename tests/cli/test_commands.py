@@ -72,6 +72,7 @@ def test_solve_prints_the_same_bytes_for_shuffled_clicks(cocalib, clicks_file, s
     assert (answer.code, answer.out) == (0, solved.read_text())
 
 
+@pytest.mark.slow
 def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_file, tmp_path):
     out, again, plain = (tmp_path / name for name in ("refined.json", "again.json", "plain.json"))
     answer = cocalib("solve", "--pairs", pairs_file, "--out", out, "--refine-intrinsics")
@@ -216,6 +217,7 @@ def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, solved, 
     assert np.array_equal(cameras[0].matrix_px, cameras[1].matrix_px)
 
 
+@pytest.mark.slow
 def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, tmp_path):
     kitti, back = tmp_path / "calib" / "00000.txt", tmp_path / "back.json"
     kitti.parent.mkdir()
@@ -236,6 +238,7 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, 
     np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 
 
+@pytest.mark.slow
 def test_a_format_without_a_place_for_distortion_is_written_for_rectified_images_with_the_maps_beside_it(
     cocalib, solved, tmp_path
 ):

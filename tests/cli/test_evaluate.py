@@ -60,6 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, scene: Street) -> Path:
     return place
 
 
+@pytest.mark.slow
 def test_residuals_come_first_and_say_what_they_rest_on(cocalib, solved):
     recording = solved.parent / "made.mcap"
     answer = cocalib("evaluate", solved, recording)
@@ -98,6 +99,7 @@ def test_acc_is_never_alone_and_a_calibration_that_looks_elsewhere_is_doubted(co
     assert "turned in yaw by" in quiet.err
 
 
+@pytest.mark.slow
 def test_the_json_has_the_documented_keys(cocalib, folder):
     arguments = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json", "--json")
     plain = json.loads(cocalib(*arguments).out)
@@ -111,6 +113,7 @@ def test_the_json_has_the_documented_keys(cocalib, folder):
     assert "labels say which returns" in truth["boxes"]["rule"]
 
 
+@pytest.mark.slow
 def test_a_turned_calibration_is_told_from_the_right_one(cocalib, folder, tmp_path):
     where = ("--against", folder / "right.txt", "--recording", folder / "street.mcap", "--boxes", folder / "boxes.json")
     answer = cocalib("check", folder / "turned.txt", *where)
@@ -137,6 +140,7 @@ def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(c
     assert "calibration.json was solved" in answer.out
 
 
+@pytest.mark.slow
 def test_classes_are_chosen_and_renamed(cocalib, folder):
     where = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json")
 
@@ -160,6 +164,7 @@ def test_without_moving_returns_there_is_no_acc(cocalib, folder, scene, tmp_path
     assert "no moving target" in answer.out
 
 
+@pytest.mark.slow
 def test_what_reading_the_boxes_took_for_granted_is_said(cocalib, folder, scene, tmp_path):
     found = [
         {"image_id": number, "category_id": 1, "score": 0.9, "bbox": [left, top, right - left, bottom - top]}

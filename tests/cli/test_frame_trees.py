@@ -86,6 +86,7 @@ def test_check_chains_a_folder_and_a_recording(calibration, recording, tmp_path,
     assert "named like a radar" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path, capsys):
     arguments = ["export", str(calibration), "--into", str(car)]
 

@@ -66,6 +66,7 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path, capsys):
     assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(served, tmp_path, cocalib):
     size = {"placements": 4, "dwell_s": 4.0, "width_px": 128, "height_px": 80, "camera_rate_hz": 1.0}
     with grey_frames():

@@ -90,6 +90,7 @@ def test_a_radar_whose_clock_is_another_time_scale_is_named_and_can_be_corrected
     assert error_of(out, sample) < (0.15, 1.5)
 
 
+@pytest.mark.slow
 def test_a_cloud_with_y_forward_is_named_with_the_axes_to_type(cocalib, cases, sample, tmp_path):
     bags, axes = (cases / "12-y-forward-cloud" / "radar.bag", sample / "camera.bag"), "right,forward,up"
     answer = cocalib("info", *bags)
@@ -110,6 +111,7 @@ def test_a_camera_matrix_times_a_pose_is_named(cocalib, cases):
     assert "inverse(K)" in answer.err
 
 
+@pytest.mark.slow
 def test_a_folder_of_calibrations_beside_images_gives_their_intrinsics(cocalib, cases, tmp_path):
     folder = shutil.copytree(cases / "47-folder-with-calib" / "set", tmp_path / "set")
     images = folder / "image"
@@ -128,6 +130,7 @@ def test_a_radar_topic_that_is_not_read_has_its_reason(cocalib, cases, name, wor
     assert words in topic["problem"]
 
 
+@pytest.mark.slow
 def test_returns_that_a_driver_has_moved_into_the_vehicles_frame_are_taken_back_by_the_mount(
     cocalib, cases, sample, tmp_path
 ):

@@ -235,6 +235,7 @@ def test_a_full_disk_ends_a_command_and_leaves_the_old_file(output, here, cocali
     assert states(here) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", ["ros1", "mcap", "db3", "csv"])
 def test_a_simulation_on_a_full_disk_leaves_nothing(container, cocalib, tmp_path):
     out = tmp_path / "new" / "made"
@@ -300,6 +301,7 @@ def test_a_simulation_is_written_into_a_new_or_empty_folder(stands, here, cocali
     assert states(here) == before
 
 
+@pytest.mark.slow
 def test_of_files_that_belong_together_none_is_written_if_one_may_not_be(here, cocalib):
     (here / "all").mkdir()
     (here / "all" / "rectification.npz").write_text("mine")

@@ -37,6 +37,7 @@ def off_px(click: dict[str, Any]) -> float:
     return float(np.linalg.norm(np.array(click["pixel_px"]) - true_pixel_px(click["image_time"])))
 
 
+@pytest.mark.slow
 def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib, recording, tmp_path):
     out = tmp_path / "proposals.json"
     answer = cocalib("solve", "--propose", recording, *SIZE, "--out", out)
@@ -63,6 +64,7 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib
     assert "nobody-confirmed" not in [one["code"] for one in json.loads(solved.out)["warnings"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [0.0, 40.0], ids=["on it", "beside it"])
 def test_a_confirmed_click_stays_and_the_others_keep_their_ids_and_learn_from_it_if_it_is_right(
     cocalib, recording, tmp_path, off
@@ -192,6 +194,7 @@ def test_frames_that_show_no_placement_are_said(cocalib, tmp_path):
     assert "no frame during any" in answer.err
 
 
+@pytest.mark.slow
 def test_the_images_of_another_recording_are_refused(cocalib, tmp_path):
     radar = replace(SEEN, with_images=False, with_camera_info=False)
     camera = Reversed(reflector_m=SEEN.reflector_m, placements=SEEN.placements, with_radar=False)

@@ -1,7 +1,10 @@
 """`cocalib evaluate --report`: calibrations of every kind, a recording, and what cannot be done."""
 
+import pytest
 
-def test_on_its_recording_the_report_has_held_out_errors_and_a_image_and_names_no_folder(
+
+@pytest.mark.slow
+def test_on_its_recording_the_report_has_held_out_errors_and_an_image_and_names_no_folder(
     cocalib, solved_sample, bags, sample, tmp_path
 ):
     out = tmp_path / "report.html"
@@ -16,6 +19,7 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_image_and_names_n
     assert len(html.encode()) < 3_000_000
 
 
+@pytest.mark.slow
 def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(cocalib, solved, clicks_file, tmp_path):
     foreign, out = tmp_path / "tf.txt", tmp_path / "tf.html"
     assert cocalib("export", solved, "--to", "tf2", "--out", foreign).code == 0

@@ -49,6 +49,7 @@ def error_of(out: Path, sample: Path) -> tuple[float, float]:
     return float(apart), float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))))
 
 
+@pytest.mark.slow
 def test_returns_are_taken_back_by_the_bags_own_transforms(cocalib, published, sample, tmp_path):
     radar, out = published("base_link", moved=True, transforms=True), tmp_path / "c.json"
     answer = cocalib("solve", radar, sample / "camera.bag", "--clicks", sample / "clicks.json", "--out", out)
@@ -68,6 +69,7 @@ def test_returns_are_taken_back_by_the_bags_own_transforms(cocalib, published, s
     assert json.loads((tmp_path / "again.json").read_text())["vehicle"] == document["vehicle"]
 
 
+@pytest.mark.slow
 def test_without_transforms_the_mount_is_asked_for_and_given(cocalib, published, sample, tmp_path):
     radar, out = published("base_link", moved=True, transforms=False), tmp_path / "c.json"
     solve = ("solve", radar, sample / "camera.bag", "--clicks", sample / "clicks.json")
@@ -81,6 +83,7 @@ def test_without_transforms_the_mount_is_asked_for_and_given(cocalib, published,
     assert cocalib(*solve, *FLAGS[:-1], "nan").code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frame", "moved"), [("base_link", False), ("radar_left", True)])
 def test_a_name_that_the_returns_contradict_is_coarse_until_somebody_decides(
     cocalib, published, sample, tmp_path, frame, moved
@@ -113,6 +116,7 @@ def test_a_recording_file_states_the_frame_and_the_mount(cocalib, published):
     np.testing.assert_allclose(mount_of(CORNER) @ moved, as_published, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_an_export_into_the_recording_takes_the_returns_back_as_the_calibration_did(
     cocalib, published, sample, tmp_path
 ):

@@ -15,6 +15,7 @@ def _spans(folder: Path) -> list[tuple[float, float]]:
     return [(p["start"]["sec"], p["end"]["sec"]) for p in placements]
 
 
+@pytest.mark.slow
 def test_a_preset_fills_what_is_not_set_and_what_is_set_wins(cocalib, tmp_path):
     both, one = tmp_path / "both", tmp_path / "one"
     assert cocalib("simulate", "--out", both, "--preset", "two-reflectors", *TINY).code == 0

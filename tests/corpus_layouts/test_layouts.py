@@ -24,6 +24,7 @@ def readings(truths) -> dict[str, Reading]:
     return {name: read(truth) for name, truth in truths.items()}
 
 
+@pytest.mark.slow
 def test_nine_of_ten_layouts_are_read_right(truths, readings):
     """A layout that leaves something open may be read the other way, if it is right as soon as the user says what it is."""
     print("\n".join(f"{name:26} {reading.outcome:18} {reading.why}" for name, reading in readings.items()))

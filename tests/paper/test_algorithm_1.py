@@ -467,6 +467,7 @@ def test_algorithm_1_does_not_care_about_the_order_of_the_clicks():
     assert [pair.id for pair in forward.pairs] == [pair.id for pair in backward.pairs]
 
 
+@pytest.mark.slow
 def test_an_excluded_click_takes_no_part_but_is_shown_with_its_residual():
     simulated = simulate_pairs(12, rng=np.random.default_rng(13), noise="imaging")
     clicks, scans = recording_of(simulated)

@@ -44,11 +44,13 @@ def agrees(folder: Path, simulated: SimulatedRecording, camera: str = "camera") 
     assert found["aed_px"] == pytest.approx(alone.metrics.aed_px, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dataset", ["d1", "d2"])
 def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset, tmp_path):
     agrees(tmp_path, recorded(dataset, tmp_path))
 
 
+@pytest.mark.slow
 def test_both_cameras_of_the_aisle_are_solved_from_one_recording(tmp_path, capsys):
     simulated = recorded("d3", tmp_path)
     agrees(tmp_path, simulated)

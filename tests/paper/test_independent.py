@@ -97,6 +97,7 @@ def both(figures: Figures) -> tuple[float, float]:
     return figures.aed_px, figures.cdsd_px
 
 
+@pytest.mark.slow
 def test_aed_and_cdsd_of_ppm_are_those_of_the_formulas(d1, d2):
     for calibration in (d1, d2[1]):
         pose = calibration.camera_from_radar
@@ -120,6 +121,7 @@ def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(d1, 
     assert condition > 1e9
 
 
+@pytest.mark.slow
 def test_pmm_looks_along_the_radar_and_the_swaps_take_its_parts(d1):
     """The camera is 4.5 cm above the radar and looks where it looks: x right, y down, z forward of x forward, y left, z up."""
     axes, offset = [(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)], (0.0, 0.045, 0.0)

@@ -24,6 +24,7 @@ def solved(pairs: list[Pair] | tuple[Pair, ...], seed: int, options: Calibration
     return calibrate_pairs(pairs, simulate_pairs(1, rng=np.random.default_rng(seed)).camera, options).unwrap()
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=SEEDS, order=st.randoms(use_true_random=False))
 def test_shuffling_pairs_changes_no_bit(seed, order):
@@ -36,6 +37,7 @@ def test_shuffling_pairs_changes_no_bit(seed, order):
     assert plain.metrics == shuffled.metrics
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=SEEDS, turn=st.floats(-0.3, 0.3))
 def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed, turn):
@@ -59,6 +61,7 @@ def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed, turn):
     assert error @ np.linalg.solve(plain.covariance, error) < 1e-4
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=SEEDS)
 def test_covariances_are_symmetric_and_positive(seed):
@@ -68,6 +71,7 @@ def test_covariances_are_symmetric_and_positive(seed):
     assert all(0.0 <= pair.outlier_probability <= 1.0 for pair in calibration.pairs)
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=SEEDS)
 def test_excluding_the_outliers_leaves_the_pose_where_it_was(seed):

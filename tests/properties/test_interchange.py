@@ -80,6 +80,7 @@ def refusal(read: Callable[..., object], *given: object) -> str:
     return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(pose=poses(), camera=cameras(), frames=frame_names())

@@ -122,6 +122,7 @@ def test_raw_packets_of_a_radar_are_listed_with_the_reason_they_are_not_read(sha
         assert "raw sensor packets" in str(topic.problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "folder", "file"),
     [

@@ -116,6 +116,7 @@ def test_first_proposals_come_while_the_images_are_looked_at(finding, watched):
     assert len(watched.until("ready", len(VIEWS)).views) == len(VIEWS)
 
 
+@pytest.mark.slow
 def test_a_click_is_carried_to_the_placements_that_are_left(finding, watched):
     finding.allowed.set()
     watched.job.ask(WISH)

@@ -44,6 +44,7 @@ def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClic
     return view(History(session), facts, reference)
 
 
+@pytest.mark.slow
 def test_the_residuals_on_the_page_are_those_of_evaluate(recording, clicks, solved):
     judged = evaluate_recording(solved, recording, clicks=clicks).residuals
     page, metrics = figures_of(shown(solved, recording, clicks, None).metrics), judged.metrics

@@ -379,6 +379,7 @@ def test_nuscenes_tables_that_do_not_fit_are_refused(tmp_path, changed, words):
         read_boxes(nuscenes(tmp_path, **changed), image_times=TIMES, image_size_px=SIZE, image_names=names)
 
 
+@pytest.mark.slow
 def test_nuscenes_tables_of_the_whole_set_are_read_row_by_row(tmp_path):
     """Rows end anywhere in the pieces that are read, braces and brackets in texts are texts, and a cut table is refused."""
     folder = nuscenes(tmp_path)

@@ -55,6 +55,7 @@ def test_a_thing_that_moves_is_boxed_and_keeps_its_track(changes):
         assert (box.label, box.track) == ("moving", "1")
 
 
+@pytest.mark.slow
 def test_images_are_reduced_and_boxes_are_in_recorded_pixels():
     count = 10
 

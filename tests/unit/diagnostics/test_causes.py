@@ -160,6 +160,7 @@ def turns(pairs: list[Pair], simulated: SimulatedPairs) -> list[Facts]:
     return [one.facts for one in warnings if one.facts.get("step") == "turn"]
 
 
+@pytest.mark.slow
 def test_a_turn_between_two_placements_is_reported_with_its_angle_and_its_place():
     for seed in range(3):
         simulated = simulate_pairs(30, rng=np.random.default_rng([10, seed]), noise="imaging")
@@ -178,6 +179,7 @@ def numbered(pairs: list[Pair]) -> list[Pair]:
     return [replace(pair, id=f"pair-{number}", image_time=None) for number, pair in enumerate(pairs, start=1)]
 
 
+@pytest.mark.slow
 def test_pairs_without_times_may_be_numbered_in_order_of_time_but_sorted_ones_are_not():
     for seed in range(3):
         simulated = simulate_pairs(30, rng=np.random.default_rng([10, seed]), noise="imaging")

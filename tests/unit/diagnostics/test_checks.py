@@ -117,6 +117,7 @@ def test_a_wrong_tape_measure_is_contradicted():
     assert "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, measured(0.02, (0.0, 0.4, 0.0)))
 
 
+@pytest.mark.slow
 def test_a_tape_that_fits_the_residuals_is_doubted_by_the_pairs_all_the_same():
     """An azimuth scale that is uncertain by 2 % leaves the pairs alone uncertain by 10 cm: then only half of these are found."""
     doubted = 0

@@ -31,6 +31,7 @@ def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) ->
     return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
+@pytest.mark.slow
 def test_pixel_covariance_is_that_of_projections_under_drawn_poses():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging")
     calibration = solved(simulated, EXACT)
@@ -163,6 +164,7 @@ def diagonal(drawn: Drawn, part: str) -> np.ndarray:
     return np.diag(getattr(drawn.answer.covariance_parts, part))
 
 
+@pytest.mark.slow
 def test_errors_that_only_widen_count_as_systematic_and_the_parts_never_exceed_the_whole():
     for seed in range(4):
         simulated = simulate_pairs(12, rng=np.random.default_rng(seed), noise="ti")

@@ -169,6 +169,7 @@ def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind, options):
         assert len(named) >= bool(wrong)
 
 
+@pytest.mark.slow
 def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_warning_says_so():
     for seed in range(3):
         rng = np.random.default_rng([62, seed])

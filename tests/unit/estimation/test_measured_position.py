@@ -118,6 +118,7 @@ def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_s
         assert step(before, after) < 1.0 or sides[0] != sides[1]
 
 
+@pytest.mark.slow
 def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position():
     blamed = [
         warning.facts["measured"]

@@ -102,6 +102,7 @@ def test_feet_are_told_by_a_measured_position(simulated, in_ranges, in_tape, mis
     assert (found["misread"], found["unit"]) == (misread, "feet")
 
 
+@pytest.mark.slow
 def test_a_position_measured_along_the_ground_beside_a_tilted_radar_is_told():
     tilted = RigOptions(radar_tilt_deg=20.0, camera_offset_m=(1.5, 0.2, 0.4))
     misread = []

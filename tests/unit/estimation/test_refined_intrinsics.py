@@ -43,6 +43,7 @@ def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_t
     assert not any("code lens-or-radar-scale" in one for one in trials)
 
 
+@pytest.mark.slow
 def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says_so():
     trials = [measure_wrong_lens(replace(UNTOLD, lens="refining priors"), trial) for trial in range(7)]
     assert all("code lens-or-radar-scale" in one for one in trials)

@@ -179,6 +179,7 @@ def test_own_targets_say_how_many_returns_have_no_box_and_that_the_loss_is_unkno
     assert "%" not in box_figures(AHEAD, PINHOLE, *by_hand()[:2], labels=by_hand()[2]).rule
 
 
+@pytest.mark.slow
 def test_which_returns_count_and_their_boxes_do_not_depend_on_the_calibration(crowd):
     targets = moving_targets(crowd.scans)
     figures = [

@@ -104,6 +104,7 @@ def test_a_near_car_with_most_of_the_returns_is_no_moving_ground():
     assert set(np.concatenate([target.rows for target in found.tracks]) % 25) == set(range(20))
 
 
+@pytest.mark.slow
 def test_without_doppler_targets_are_what_travels():
     scene = street(people=2, seconds=20.0, with_doppler=False)
     found = find_targets([scene.scans])

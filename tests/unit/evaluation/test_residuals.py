@@ -104,6 +104,7 @@ def test_the_judged_calibration_does_not_choose_the_returns(solved):
     assert judged.median_px > 5.0 * residual_figures(found, calibration, with_held_out=False).median_px
 
 
+@pytest.mark.slow
 def test_clicks_of_one_placement_are_left_out_together():
     simulated = simulate_pairs(8, rng=np.random.default_rng(4), noise="imaging")
     twice = [
@@ -278,6 +279,7 @@ def test_equal_calibrations_are_equal():
     assert residual_difference(residuals([1, 2, 3]), residuals([1, 2, 3]), lost_px=1000.0).winner == "equal"
 
 
+@pytest.mark.slow
 def test_acc_is_compared_frame_by_frame():
     scene = street(people=2, seconds=30.0)
     targets = moving_targets(scene.scans)

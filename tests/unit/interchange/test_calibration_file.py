@@ -325,6 +325,7 @@ def with_vehicle(vehicle: object) -> str:
     return json.dumps({**json.loads(GOLDEN), "vehicle": vehicle})
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(_NOTES, _NOTES)
 def test_any_note_is_read_back_and_goes_before_what_a_file_says(one, other):

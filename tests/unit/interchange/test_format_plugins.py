@@ -231,6 +231,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
     assert "taken from here" not in only_line(caplog)
 
 
+@pytest.mark.slow
 def test_a_broken_package_says_so_on_stderr_and_the_command_goes_on(installed, tmp_path):
     installed(module="raise RuntimeError('worn out')")
     program = f"import sys; sys.path.insert(0, {str(tmp_path / 'site-packages')!r}); from cocalib.cli import run; "

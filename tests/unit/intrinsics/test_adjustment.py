@@ -307,6 +307,7 @@ def test_two_views_taken_apart_that_look_like_mirror_images_are_both_used():
     assert mirror_twins(copied, 0.2) == ((0, 1),)
 
 
+@pytest.mark.slow
 def test_a_board_with_other_squares_is_called_another_board():
     camera = CAMERAS["plumb_bob"]
     pose = solved(*GOOD).views[2].camera_from_board

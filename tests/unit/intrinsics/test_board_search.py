@@ -231,6 +231,7 @@ def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(mode
     assert np.abs(errors).max() < 0.2
 
 
+@pytest.mark.slow
 def test_light_that_falls_off_to_one_side_does_not_move_corners():
     film = replace(FILM, gradient=(0.35, -0.2), vignetting=0.4)
     errors = [

@@ -248,6 +248,7 @@ def test_a_pattern_that_all_views_share_is_more_than_noise():
     assert field.systematic_px == pytest.approx(0.1, abs=0.03)
 
 
+@pytest.mark.slow
 def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours():
     field = residual_field(calibrated_over_the_image("pinhole", 25, truth="plumb_bob"))
     assert field.neighbour_correlation > 0.5

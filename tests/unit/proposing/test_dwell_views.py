@@ -103,6 +103,7 @@ def test_progress_brings_candidates_early_and_can_be_stopped():
     assert [bool(view.candidates) for view in views] == [True] * 4 + [False] * (len(views) - 4)
 
 
+@pytest.mark.slow
 def test_images_of_dwells_long_ago_are_forgotten_and_their_candidates_kept():
     dwells = [DrawnDwell(8.0 * k, 8.0 * k + 2.5, (60.3 + 6.0 * k, 60.8 + 70.0 * (k % 2))) for k in range(27)]
     views = views_of(DrawnFrames(dwells))

@@ -267,6 +267,7 @@ def taken(views: tuple[DwellView, ...]) -> AutomaticClicks | Unsolvable:
     return automatic_clicks(proposals_of(views, CAMERA, OPTIONS), views, CAMERA, OPTIONS)
 
 
+@pytest.mark.slow
 def test_clear_proposals_become_snapped_clicks_in_order_of_time():
     drawn = draw_views(1, Drawing(count=10))
     found = taken(drawn.views)

@@ -222,6 +222,7 @@ def until(condition: Callable[[], bool]) -> None:
         assert time.monotonic() < end, "it never came"
 
 
+@pytest.mark.slow
 def test_what_a_killed_writer_has_written_stays(tmp_path, project_root):
     path = tmp_path / "drive.mcap"
     writing = subprocess.Popen([sys.executable, "-m", "tests.growing_recording", path, "40", "0.7"], cwd=project_root)

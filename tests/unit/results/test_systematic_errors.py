@@ -213,6 +213,7 @@ def test_a_reported_position_corrected_by_the_errors_is_the_true_one():
     np.testing.assert_allclose(errors.corrected(cartesian_from_polar(polar)), points, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, TAPED], ids=["free", "taped"])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_an_azimuth_scale_of_three_percent_is_found_and_the_truth_is_covered(noise, options):

@@ -81,6 +81,7 @@ def test_a_return_named_after_a_person_comes_from_where_that_person_is():
     assert checked > 100
 
 
+@pytest.mark.slow
 def test_a_box_touches_what_the_renderer_draws():
     recording = _standing(simulate(replace(WALK, width_px=640, height_px=360)), ("person", 6.0, 0.4, 2.0))
     stage = recording.stage
@@ -128,6 +129,7 @@ def test_a_box_ends_at_the_border_of_the_image_and_nobody_outside_has_one():
     assert not _boxes(("person", -4.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_the_files_are_written_where_something_moves_that_is_worth_judging(tmp_path):
     small = replace(WALK, width_px=64, height_px=64, camera_rate_hz=1.0)
     write_recording(simulate(small), tmp_path / "walk")
@@ -149,6 +151,7 @@ def test_the_files_are_written_where_something_moves_that_is_worth_judging(tmp_p
     }
 
 
+@pytest.mark.slow
 def test_who_carries_the_reflector_and_passers_by_have_tracks_of_their_own():
     recording = simulate(
         replace(WALK, placements=2, dwell_s=4.0, traffic=Traffic(), surroundings=Surroundings(passers_by=2))

@@ -113,6 +113,7 @@ def test_camera_info_carries_the_intrinsics(recording, folder):
     assert (infos[0].distortion_model, infos[0].width, infos[0].height) == ("plumb_bob", 128, 80)
 
 
+@pytest.mark.slow
 def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path):
     recording = simulate(replace(OPTIONS, placements=1, radar="imaging", camera_rate_hz=1.0))
     write_recording(recording, tmp_path)

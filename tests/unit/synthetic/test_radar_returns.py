@@ -165,6 +165,7 @@ def test_bins_are_as_wide_as_asked():
         assert np.abs(values / width - np.round(values / width)).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_returns_scatter_from_scan_to_scan_as_asked():
     coarse = RadarDefects(scatter_range_m=0.15, scatter_azimuth_deg=1.5, scatter_elevation_deg=3.0)
     spreads = []
@@ -201,6 +202,7 @@ def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
     assert {m.topic for m in messages} == {f"{CLOUD_TOPIC}_near", f"{CLOUD_TOPIC}_far"}
 
 
+@pytest.mark.slow
 def test_a_session_without_images_has_the_scans_of_both_antennas():
     session = simulate(replace(QUIET, placements=2, defects=RadarDefects(near_and_far=True)))
     assert len(session.scans) == sum(len(antenna.times) for antenna in session.stage.antennas)

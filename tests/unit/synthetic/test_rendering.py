@@ -110,6 +110,7 @@ def test_pixels_look_where_the_lens_says(model):
     assert np.abs(back - pixels).max() < 0.02
 
 
+@pytest.mark.slow
 def test_a_frame_is_the_same_every_time(renderer, stage):
     moment = stage.story.at(7.3)
     assert np.array_equal(renderer.render(moment), renderer.render(moment))
@@ -166,6 +167,7 @@ def test_what_stands_in_front_of_a_person_hides_them(renderer, stage):
     assert hidden.sum() > 100
 
 
+@pytest.mark.slow
 def test_sensor_noise_is_as_strong_as_requested_and_seeded():
     noisy = replace(OPTIONS, width_px=160, height_px=96, sensor_noise_grey=4.0)
     first, again = (next(simulate(noisy).frames(1)).pixels for _ in range(2))

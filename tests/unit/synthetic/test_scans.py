@@ -29,6 +29,7 @@ def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session):
     assert session.clicks != other.clicks
 
 
+@pytest.mark.slow
 def test_interpolated_azimuths_leave_the_lattice():
     session = simulate(replace(SHORT, defects=RadarDefects(azimuth_bins=0)))
     u = direction_cosines(session.scans.points_radar_m)[:, 1]
@@ -124,6 +125,7 @@ def test_on_a_tripod_the_heights_vary():
     assert heights.max() - heights.min() > 0.8
 
 
+@pytest.mark.slow
 def test_in_heavy_clutter_something_is_stronger_than_the_reflector():
     session = simulate(replace(SHORT, clutter="heavy", person=False, placements=8))
     placement = session.placements[-1]
@@ -165,6 +167,7 @@ def test_traffic_leaves_placements_and_clicks_where_they_are(session):
     assert np.array_equal(busy.scans.times_ns, session.scans.times_ns)
 
 
+@pytest.mark.slow
 def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher():
     usual, large = (
         simulate(replace(SHORT, clutter="none", person=False, reflector_edge_m=edge)) for edge in (0.16, 0.32)

@@ -48,6 +48,7 @@ def test_without_noise_the_radar_positions_project_onto_the_clicks():
     assert np.abs(projected - _clicks(simulated)).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_clicks_and_radar_errors_have_the_profiles_standard_deviations():
     rng = np.random.default_rng(8)
     profile = NOISE_PROFILES["ti"]

@@ -78,6 +78,7 @@ def test_another_scene_or_a_blank_one_says_nothing():
     assert camera_turn(np.full((HEIGHT, WIDTH), 128, dtype=np.uint8), scene(), CAMERA) is None
 
 
+@pytest.mark.slow
 def test_a_walker_in_a_third_of_the_frames_leaves_no_trace():
     rng = np.random.default_rng(4)
 

@@ -43,6 +43,7 @@ def watch_of(*, with_traffic: bool = False) -> Watch:
     return Watch(baseline_of(found, calibration_sha256="a" * 64, recording="r", camera=SMALL), WATCHED)
 
 
+@pytest.mark.slow
 def test_a_camera_that_turns_against_the_radar_is_seen_and_when():
     watch = watch_of()
     before = [watch.add(stretch(number)) for number in range(10, 12)]
@@ -134,6 +135,7 @@ def test_stretches_hold_traffic_image_and_scans_of_half_a_minute():
     assert (found[1].rows.times_ns >= found[1].start).all()
 
 
+@pytest.mark.slow
 def test_a_recording_that_grows_is_waited_for():
     recording = _Street()
     times = recording.radar_times

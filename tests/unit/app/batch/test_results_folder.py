@@ -134,6 +134,7 @@ def run_python(code: str, *arguments: str | Path) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 def test_killed_at_any_moment_a_result_is_whole_or_absent(tmp_path):
     moments, finished = run_python(_KILLED, tmp_path).split()

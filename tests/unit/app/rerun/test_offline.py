@@ -48,6 +48,7 @@ def test_a_viewer_is_told_to_send_nothing_even_if_the_user_forces_it():
     assert environment["PATH"] == "/bin"
 
 
+@pytest.mark.slow
 def test_commands_without_rerun_work_where_it_is_missing(project_root):
     answer = without_rerun("info", project_root / "sample_data" / "rooftop" / "radar.bag")
     assert answer.returncode == 0, answer.stderr

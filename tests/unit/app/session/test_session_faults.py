@@ -47,6 +47,7 @@ def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path,
     assert counts.total() > 2000
 
 
+@pytest.mark.slow
 def test_a_journal_cut_anywhere_is_told_and_a_copy_cut_anywhere_changes_nothing(short, folder):
     counts = every_length(short, folder, name=JOURNAL)
     assert counts == {"continued and told": counts.total()}

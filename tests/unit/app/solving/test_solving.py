@@ -163,6 +163,7 @@ def test_lost_data_are_told_by_clicks_and_by_their_share(without, touched, share
     assert (warning.code if warning else "") == code
 
 
+@pytest.mark.slow
 def test_a_gap_within_a_damaged_recording_touches_the_click_in_it(tmp_path, recording, clicks):
     scans = recording.radar_scans()
     gone = np.abs(scans.times_ns - int(clicks[4].image_time)) < 10**9

@@ -33,6 +33,7 @@ def test_the_advised_place_is_in_the_image_and_in_the_text_with_its_side_as_the_
     assert [words for words in (f"{x_m:.1f} m ahead", side) if words not in advice.words] == []
 
 
+@pytest.mark.slow
 def test_many_placements_are_enough():
     assert advised(solved(400)).best.may_stop
 

@@ -369,6 +369,7 @@ def test_simulated_radars_are_opened_as_what_they_are(tmp_path, preset, topics, 
         assert (scans.alternative_of is not None) == alternatives
 
 
+@pytest.mark.slow
 def test_the_simulated_front_radar_is_chosen_over_the_side_radar(tmp_path):
     recording = simulate(replace(PRESETS["two-radars"], placements=2, dwell_s=3.5, seed=5))
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))

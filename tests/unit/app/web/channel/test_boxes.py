@@ -97,6 +97,7 @@ def test_other_boxes_replace_the_first_and_what_stands_meanwhile_is_marked(works
     ]
 
 
+@pytest.mark.slow
 def test_what_moves_is_found_with_its_progress(workspace, walk, threads):
     told = at_desk(workspace, walk, threads, MovingBoxesWanted())
     progress = [message for message in told if isinstance(message, Progress)]
@@ -106,6 +107,7 @@ def test_what_moves_is_found_with_its_progress(workspace, walk, threads):
     assert panels(told)[-1].figures
 
 
+@pytest.mark.slow
 def test_why_nothing_moves_is_told(workspace, walk, threads, monkeypatch):
     still = walk.image(0)
     monkeypatch.setattr(walk, "image", lambda _index: still)

@@ -101,6 +101,7 @@ def test_every_frame_is_told_once_and_in_order(tmp_path):
     follow(tmp_path, story)
 
 
+@pytest.mark.slow
 def test_in_the_end_the_placements_are_those_of_the_whole_recording(tmp_path):
     assert GrowingSurvey(GatingOptions()).survey(np.array([0, 10**9])).rows == (), "without scans"
 

@@ -93,6 +93,7 @@ def test_a_page_that_applies_changes_has_the_newest_view(steps):
         assert page == json.loads(encode(newest))
 
 
+@pytest.mark.slow
 @given(views, views)
 def test_rows_may_move_and_share_an_id(before, after):
     before = replace(before, clicks=(*before.clicks, *before.clicks[:1]))
