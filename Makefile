@@ -54,7 +54,7 @@ check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/typos
-	$(BIN)/pytest -q tests/architecture
+	$(BIN)/pytest -q -m "not slow" tests/architecture
 	@$(BIN)/python .ci/structure.py grown
 	@$(BIN)/python .ci/installed_size
 
@@ -62,9 +62,9 @@ test: dev  ## Run the tests, including those in the browser, but for the slow on
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/pytest $(PARALLEL) -m "not slow" --ignore tests/architecture --ignore tests/accuracy
 
-test-all: dev  ## Run the slow ones too, and tests/accuracy, which solves many simulated sets: before a release, and every week.
+test-all: dev  ## Run everything: the slow ones, the wheel, and tests/accuracy, which solves many simulated sets.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/pytest $(PARALLEL) --ignore tests/architecture
+	$(BIN)/pytest $(PARALLEL)
 
 test-fast: dev  ## Run the core's tests, in under a minute of processor time.
 	$(BIN)/pytest -q -m "not slow and not real" $(FAST)
