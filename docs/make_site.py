@@ -5,6 +5,7 @@ font from elsewhere and a site of more than 10 MB.
 """
 
 import argparse
+import ast
 import hashlib
 import json
 import re
@@ -54,10 +55,28 @@ def _commands() -> Iterator[str]:
 def _python() -> Iterator[str]:
     """Yield the page of the Python names."""
     yield "# Python\n\n`import cocalib as cc`; the [examples](examples.md) use it. Functions of arrays say their shapes.\n"
+    uses = _uses(_ROOT / "docs" / "examples")
     for name in calib_core.__all__:
         kind = "autoclass" if isinstance(getattr(calib_core, name), type) else "autofunction"
         members = "\n   :members:" if kind == "autoclass" else ""
         yield f"```{{eval-rst}}\n.. {kind}:: calib_core.{name}{members}\n```\n"
+        if name in uses:
+            yield f"```python\n{uses[name]}\n```\n"
+
+
+def _uses(folder: Path) -> dict[str, str]:
+    """Return by public name the shortest statement of the examples that uses it; of one with a body its head."""
+    uses: dict[str, str] = {}
+    for path in sorted(folder.glob("*.py")):
+        source = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Assign | ast.Expr | ast.With | ast.For):
+                text = ast.get_source_segment(source, node) or ""
+                if isinstance(node, ast.With | ast.For):
+                    text = text.split("\n")[0] + "\n    ..."
+                for name in re.findall(r"\bcc\.(\w+)", text):
+                    uses[name] = min(uses.get(name, text), text, key=len)
+    return uses
 
 
 def _notebook(path: Path) -> Iterator[str]:
