@@ -17,6 +17,7 @@ aim and the verdict of each, in a file beside the benchmark. Real pairs and reco
 - **The stated 95 % holds** if radar, lens, clicks and measured position are wrong by no more than the options state, with
   12 pairs or more spread over the image, about one in ten of them wrong, and right axes, units and intrinsics{held}.
 {outside}
+  The region is mostly larger than it need be, for it allows for smooth errors: see the stated sigma over the RMSE.
 - **Measure the camera position.** {tape}
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, and elevations that are all
   wrong alike. The verdict says that it assumes neither; a measured position shows most of both, with an imaging radar all. An
@@ -25,20 +26,26 @@ aim and the verdict of each, in a file beside the benchmark. Real pairs and reco
 
 ## How it was measured
 
-Everything is simulated, with a seed per set, so that the number of processors changes no figure. {seeds}
+Everything is simulated. Noise and shared errors are drawn from the model that the estimator assumes, so those sections
+test its statistics and not the model; smooth errors, presets and defects depart from it. There is a seed per
+set, so that the number of processors changes no figure. {seeds}
 
 Noise levels are assumptions from vendors' figures: `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
 `ti_aisle` the same in a narrow aisle (2 cm, 0.8, 2), `ti_fine` with interpolated peaks (0.8 cm, 0.2, 0.7), `imaging` an imaging
 radar (3 cm, 0.12, 0.25); clicks have 2 px in a 1920 x 1080 image of 75 deg. Placements are 2 to 20 m away. "Free" means that
 the camera position is not measured, "tape" that it is, to 1 cm per axis. *Inside*: the true pose is in the stated 95 %
-ellipsoid. *Good*, *usable* and *coarse* are the verdict's levels.
+ellipsoid. *Good*, *usable* and *coarse* are the verdict's levels. *Silent* and *misleading* answers are far outside without a
+warning that names the cause; the section on defects defines both. RMSE is the root mean square of the angle or distance.
 
-After ± are two standard errors. "Met": the figure reaches the aim. "Undecided": it does not, by less than two standard errors.
+Aims without a reason are choices. c35a642 is an earlier version of cocalib.
+
+After ± are two standard errors (of shares with two successes and two failures added); "upper limit" is one-sided, 95 %.
+"Met": the figure reaches the aim. "Undecided": it does not, by less than two standard errors.
 "Missed": by more; of forty rows where nothing is wrong, one is missed by chance.
 """
 
 _FIXED = "The draws are those of fixed seeds, which development may have seen."
-_FRESH = "The draws come from a commit's hash, {commit}, after the code was written: nobody had seen them."
+_FRESH = "The draws come from a commit's hash, {commit}, after the code and the aims in it were written: nobody had seen them."
 
 
 def page(
