@@ -30,6 +30,8 @@ _PAGES = {
     "Reference": "commands page python formats warnings",
     "Project": "accuracy real paper-experiments speed CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
+_WRAPPED = ".highlight pre { white-space: pre-wrap; overflow-wrap: anywhere; }\n"
+"""No line of code is cut off, whatever the window."""
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
 _STYLES = (
     ('style="display: none;"', 'class="visually-hidden"'),
@@ -128,6 +130,8 @@ def _assemble(folder: Path) -> None:
     for name in ("CITATION.cff", "LICENSE", "pyproject.toml"):
         shutil.copy(_ROOT / name, folder / name)
     shutil.copy(_ROOT / "static" / "icon.svg", folder / "icon.svg")
+    (folder / "styles").mkdir()
+    (folder / "styles" / "site.css").write_text(_WRAPPED, encoding="utf-8")
 
 
 def _moved(out: Path, inline: re.Match[str]) -> str:
@@ -153,6 +157,8 @@ def main() -> int:
         "html_math_renderer": "mathml",
         "html_show_copyright": False,
         "html_favicon": "icon.svg",
+        "html_static_path": ["styles"],
+        "html_css_files": ["site.css"],
         "html_copy_source": False,
         "html_use_index": False,
         "html_show_sourcelink": False,
