@@ -106,6 +106,11 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     else:
         lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
         yield Content("lines", text=text, lines=tuple(lines))
-        documents = yaml_documents(text, source=source)
-        value = joined_documents(documents, source=source)
-        yield Content("yaml", text=text, value=value, documents=documents)
+        try:
+            documents = yaml_documents(text, source=source)
+        except InputError as error:
+            if source.lower().endswith((".yaml", ".yml")):
+                raise
+            why = str(error).removeprefix(f"{source}: ")
+            raise InputError(f"{source}: is in no format that is read here; taken for YAML, {why}") from None
+        yield Content("yaml", text=text, value=joined_documents(documents, source=source), documents=documents)

@@ -198,3 +198,9 @@ def test_a_repeated_key_is_found_without_comparing_all_keys():
     with pytest.raises(ValueError, match="'k1999' appears twice"):
         parsing._without_repeats([(key, 1) for key in (*keys, Key("k1999"))])
     assert len(compared) < 100
+
+
+@pytest.mark.parametrize(("source", "begins"), [("notes.md", "is in no format"), ("rig.yaml", "line 1: not YAML")])
+def test_a_text_that_is_no_calibration_is_not_told_to_become_yaml(source, begins):
+    with pytest.raises(InputError, match=f"^{source}: {begins}"):
+        read_any("note: a: b\n", source)
