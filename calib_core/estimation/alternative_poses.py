@@ -92,10 +92,9 @@ def find_agreeing_outliers(
     # a companion's camera may be anywhere
     free = replace(measurements, prior=measurements.prior.weakened()).some(outliers)
     starts = _starts(free, refined.camera_from_radar, rng)
-    used = np.ones((len(starts), len(free)), dtype=bool)
     posterior = pose_posterior(free, refined.camera_from_radar)
     as_assumed = np.zeros((len(starts), 4))
-    modes = refine_poses(posterior, batch_of(starts), as_assumed, share=_SHARE, used=used, rounds=_ROUNDS)
+    modes = refine_poses(posterior, batch_of(starts), as_assumed, share=_SHARE, rounds=_ROUNDS)
     agree = modes.inlier > 0.5
     ratios = np.where(agree.sum(axis=1) >= _LEAST_PAIRS, _log_ratios(modes, free.prior.sigma_m), -np.inf)
     best = int(np.argmax(ratios))

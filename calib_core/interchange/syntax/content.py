@@ -112,5 +112,5 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
             if source.lower().endswith((".yaml", ".yml")):
                 raise
             why = str(error).removeprefix(f"{source}: ")
-            raise InputError(f"{source}: is in no format that is read here; taken for YAML, {why}") from None
+            raise InputError(f"{source}: is in no format that is read here; if it is meant to be YAML: {why}") from None
         yield Content("yaml", text=text, value=joined_documents(documents, source=source), documents=documents)
