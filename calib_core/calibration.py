@@ -26,7 +26,13 @@ from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
-from calib_core.estimation.pair_results import click_results, excluded_pair_results, fit_metrics, used_pair_results
+from calib_core.estimation.pair_results import (
+    click_results,
+    excluded_by_residual,
+    excluded_pair_results,
+    fit_metrics,
+    used_pair_results,
+)
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, Method, checked_options
@@ -174,9 +180,13 @@ def _as_printed(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
         placements = {
             pair.id: Placement(pair.candidates[0].position_radar_m, pair.chosen is not None) for pair in pairing.pairs
         }
-        yield calibrate_as_printed(given.clicks, given.scans, camera, options, placements)
+        outcome = calibrate_as_printed(given.clicks, given.scans, camera, options, placements)
     else:
-        yield solve_pairs_as_printed(checked_pairs(given.pairs, with_noise=False), camera, options, given.excluded)
+        pairs = checked_pairs(given.pairs, with_noise=False)
+        outcome = solve_pairs_as_printed(pairs, camera, options, given.excluded)
+    if isinstance(outcome, Calibration):
+        outcome = replace(outcome, warnings=(*outcome.warnings, *excluded_by_residual(outcome)))
+    yield outcome
 
 
 METHODS: Mapping[Method, Callable[[MethodInput], Iterator[Calibration | Unsolvable]]] = {
@@ -368,7 +378,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     apart = clocks_apart(used, task.camera, options, solution.refined)
     return replace(
         calibration,
-        warnings=without_consequences((*apart, *warnings_of(solved_fit))),
+        warnings=without_consequences((*apart, *warnings_of(solved_fit), *excluded_by_residual(calibration))),
         angle_map=angle_map if angle_map is not None and angle_map.pays else None,
         next_placement=next_placement(calibration),
     )

@@ -16,10 +16,11 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import associate
 from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
-from calib_core.measurements import Candidate, Pair
+from calib_core.measurements import Candidate, DataWarning, Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines, sigma_polar_of
 from calib_core.results import Calibration, Metrics, PairResult
+from calib_core.results.calibration import CHI2_999_2
 from calib_core.results.metrics import distances, metrics_of
 
 
@@ -170,6 +171,38 @@ def _click_result(calibration: Calibration, result: PairResult, pair: Pair, clic
     )
 
 
+def excluded_by_residual(calibration: Calibration) -> list[DataWarning]:
+    """Warn of pairs that the user left out because of their residuals: they would agree, and are longer than chance makes them.
+
+    Residuals are compared as predictions: an excluded pair has no part in the pose, of the others leave-one-out counts. By chance
+    the ranks of k among n have a sum more than two standard deviations above its mean in 2.3 % (Wilcoxon).
+    """
+    kept = [pair for pair in calibration.pairs if pair.inlier and not pair.excluded]
+    chosen = [pair for pair in calibration.pairs if pair.excluded and _would_agree(calibration, pair)]
+    if not kept:
+        return []
+    k, m = len(chosen), len(kept)
+    longer = ((m + 3.0) / max(m - 3.0, 1.0)) ** 0.5  # a prediction than a residual, with 6 parameters of 2 m values
+    kept_px = [p.held_out_px if np.isfinite(p.held_out_px) else longer * p.distance_px for p in kept]
+    lengths_px = np.array([pair.distance_px for pair in chosen])
+    above = float((lengths_px[:, None] > np.array(kept_px)).sum()) - 0.5 * k * m
+    if above <= _BY_CHANCE * (k * m * (k + m + 1) / 12.0) ** 0.5:
+        return []
+    metrics = calibration.metrics
+    all_px = (metrics.n * metrics.aed_px + lengths_px.sum()) / (metrics.n + k)
+    facts = {"ids": [pair.id for pair in chosen], "aed_px": metrics.aed_px, "all_aed_px": float(all_px)}
+    return [DataWarning("excluded-by-residual", facts)]
+
+
+def _would_agree(calibration: Calibration, pair: PairResult) -> bool:
+    """Return whether an excluded pair fits the pose; without a noise model all that is seen does."""
+    measured = pair.measured
+    if measured is None or measured.mark == "untouched" or not np.isfinite(pair.distance_px):
+        return False
+    (fit,) = candidate_fits(calibration, measured, (measured.candidates[pair.candidate],))
+    return not fit.squared > CHI2_999_2
+
+
 def averaged_distances_px(calibration: Calibration) -> Values:
     """Return the residuals (n,) [px] that the AED averages: of the placements that agree, as pose and radar errors project them.
 
@@ -200,6 +233,7 @@ def _return_of(group: PlacementGroup, results: Mapping[str, PairResult]) -> Vect
     return group.pair.candidates[int(nearest)].position_radar_m
 
 
+_BY_CHANCE = 2.0  # standard deviations
 _ELSEWHERE = 3.0  # steps between two returns that are not parts of one
 _NONE_OF_THEM = 0.1
 """Probability, before the click is compared, that none of the candidates is the reflector."""

@@ -132,7 +132,7 @@ HELD_OUT_RATIO = 2.0
 _CONTRADICTIONS = ("mirrored-axes", "no-pose", "no-consensus", "refinement-diverged")
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
-_FEW = "few-pairs"
+_FEW, _EXCLUDED = "few-pairs", "excluded-by-residual"
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _BY_DEFAULT = SetOption("method", "default")
 _MOST_CHECKED = 3
@@ -173,6 +173,7 @@ class Verdict:
         unconfirmed: how many units, signs or meanings are assumed of the recording.
         everything_clicked: only more than this recording can help.
         assumed: what the stated error rests on; None if there is none.
+        excluded: that pairs were left out by their residual; None if they were not.
     """
 
     level: VerdictLevel
@@ -185,6 +186,7 @@ class Verdict:
     unconfirmed: int = 0
     everything_clicked: bool = False
     assumed: Assumed | None = None
+    excluded: DataWarning | None = None
 
     @property
     def done(self) -> bool:
@@ -220,10 +222,12 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
         return Verdict("contradictory", FollowHint() if by_default else _BY_DEFAULT, cause=warning)
     if unconfirmed:
         return Verdict("coarse", ConfirmAssumptions(), unconfirmed=unconfirmed)
+    excluded = next((one for one in outcome.warnings if one.code == _EXCLUDED), None)
     if not _states_error(outcome):
         grave = warning if warning is not None and consequence_of(warning.code) == "coarse" else None
-        return Verdict("coarse", _BY_DEFAULT, cause=grave, rms_px=outcome.metrics.rms_px)
-    return replace(_verdict_of_pose(outcome, stated_error(outcome), warning, left), assumed=_assumptions_of(outcome))
+        return Verdict("coarse", _BY_DEFAULT, cause=grave, rms_px=outcome.metrics.rms_px, excluded=excluded)
+    verdict = _verdict_of_pose(outcome, stated_error(outcome), warning, left)
+    return replace(verdict, assumed=_assumptions_of(outcome), excluded=excluded)
 
 
 def _assumptions_of(calibration: Calibration) -> Assumed:
@@ -390,7 +394,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         _NOT_MIRRORED,
         "nobody-confirmed",
     ),
-    "note": ("angle-scale", "placement-ranges"),
+    "note": (_EXCLUDED, "angle-scale", "placement-ranges"),
 }
 """The codes of each consequence, the gravest first."""
 _RANKED: dict[str, tuple[int, Consequence]] = {

@@ -40,7 +40,7 @@ class StatedVerdict:
     Attributes:
         level: how large the error is, which holds with 95 %: "good", "usable" or "coarse"; or "contradictory": the data
             contradict the pose or each other; or "nothing": there is no calibration.
-        reason: the stated error, or what contradicts; without a full stop.
+        reason: the stated error, or what contradicts; then how many pairs were left out by their residual; without a full stop.
         action: the one thing that helps most; a sentence without a full stop.
         assumes: what the stated error rests on and no pair can show; without a full stop, empty if there is nothing.
     """
@@ -91,7 +91,18 @@ def error_text(error: StatedError) -> str:
 
 
 def reason(verdict: Verdict) -> Words:
-    """Return the stated error, or what decides instead, as a phrase."""
+    """Return the stated error, or what decides instead, as a phrase; then how many pairs were left out by their residual."""
+    return join((_reason(verdict), _excluded_words(verdict.excluded)), "; ")
+
+
+def _excluded_words(excluded: DataWarning | None) -> str:
+    if excluded is None:
+        return ""
+    facts = excluded.facts
+    return f"{len(facts['ids'])} excluded by residual (mean reprojection error with them {facts['all_aed_px']:.3g} px)"
+
+
+def _reason(verdict: Verdict) -> Words:
     if verdict.unconfirmed:
         one = verdict.unconfirmed == 1
         return words(

@@ -197,6 +197,19 @@ def one_pair_decides(*, pair: str, loss: float) -> Remark:
     )
 
 
+def excluded_by_residual(*, ids: Sequence[str], aed_px: float, all_aed_px: float) -> Remark:
+    """Given when pairs are excluded that would agree, and their residuals are longer than those of a random choice in 98 %.
+
+    Could also be: clicks that were wrong, by less than the noise explains.
+    """
+    return remark(
+        f"{len(ids)} pairs that would agree are excluded, with residuals longer than chance makes them: the mean reprojection "
+        f"error is {aed_px:.3g} px without and {all_aed_px:.3g} px with them, and the latter says how well the pose fits",
+        say("include those of {ids} again whose click and return are right", ids=listed(ids)),
+        ReviewPairs(tuple(ids)),
+    )
+
+
 def mirrored_axes(
     *, log_likelihood_ratio: float = 0.0, camera_below_m: float = 0.0, radar_above_m: float = 0.0
 ) -> Remark:
@@ -947,6 +960,7 @@ SOLVER = by_code(
     clock_bias_suspected,
     clocks_apart,
     damaged_recording,
+    excluded_by_residual,
     few_pairs,
     flat_radar,
     handedness_assumed,

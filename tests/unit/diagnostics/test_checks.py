@@ -21,6 +21,7 @@ from calib_core.options import (
     CalibrationOptions,
     CameraPositionPrior,
     GatingOptions,
+    Method,
     SolvingOptions,
     without_systematic_errors,
 )
@@ -130,6 +131,37 @@ def test_a_tape_that_fits_the_residuals_is_doubted_by_the_pairs_all_the_same():
         doubted += bool(found & {"camera-position-contradicted", "camera-position-doubtful"})
         assert codes(simulated.pairs, simulated.camera, measured(0.01, (x_m + 0.02, y_m, z_m - 0.02))) == set()
     assert doubted >= 5
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_who_excludes_the_longest_residuals_is_told_with_the_error_of_all(method: Method) -> None:
+    simulated, options = simulate_pairs(20, rng=np.random.default_rng(6)), replace(measured(), method=method)
+    calibration = calibrate_pairs(simulated.pairs, simulated.camera, options)
+    assert isinstance(calibration, Calibration)
+    ids = [pair.id for pair in sorted(calibration.pairs, key=lambda pair: -pair.distance_px)]
+    cut = calibrate_pairs(simulated.pairs, simulated.camera, options, frozenset(ids[:5]))
+    assert isinstance(cut, Calibration)
+    (excluded,) = (one for one in cut.warnings if one.code == "excluded-by-residual")
+    assert set(excluded.facts["ids"]) == set(ids[:5])
+    assert cut.metrics.aed_px == excluded.facts["aed_px"] < excluded.facts["all_aed_px"]
+    assert excluded.facts["all_aed_px"] == pytest.approx(np.mean([pair.distance_px for pair in cut.pairs]))
+    assert verdict_on(cut).excluded is excluded
+    assert warning_remark(excluded).action == ReviewPairs(tuple(excluded.facts["ids"]))
+    for chosen in (ids[-5:], ids[::4], ids[:1]):
+        other = calibrate_pairs(simulated.pairs, simulated.camera, options, frozenset(chosen))
+        assert isinstance(other, Calibration)
+        assert verdict_on(other).excluded is None
+
+
+def test_leaving_out_pairs_that_disagree_anyway_is_not_excluding_by_residual() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(6), outlier_share=0.2)
+    calibration = calibrate_pairs(simulated.pairs, simulated.camera, measured())
+    assert isinstance(calibration, Calibration)
+    outliers = frozenset(pair.id for pair in calibration.pairs if not pair.inlier)
+    cut = calibrate_pairs(simulated.pairs, simulated.camera, measured(), outliers)
+    assert isinstance(cut, Calibration)
+    assert len(outliers) > 2
+    assert verdict_on(cut).excluded is None
 
 
 def test_placements_in_one_corner_give_a_weak_geometry():

@@ -152,6 +152,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("handedness-open"),
     DataWarning("intrinsics-suspected", {"focal_length": 0.02, "sigma": 0.004, "beside": [("azimuth", "azimuth^3")]}),
     DataWarning("intrinsics-suspected", {"distortion_px": 9.0, "sigma": 2.0}),
+    DataWarning("excluded-by-residual", {"ids": ["c3", "c9"], "aed_px": 8.1, "all_aed_px": 9.7}),
     DataWarning("intrinsics-suspected", {"refined_too_far": [replace(_SCALE, name="focal_length", value=0.2)]}),
     DataWarning("intrinsics-suspected", {**_OFF_MIDDLE, "mode": "4:3"}),
     DataWarning("lens-or-radar-scale", {"change": 0.02, "sigma": 0.01, "scales": [_SCALE]}),
