@@ -128,9 +128,9 @@ function drawAll() {
   highlight.selected = state.selected;
   wordsLine.textContent = review ? said(review.words) : "";
   drawFilters();
-  drawMarks();
   drawPlots();
   drawPair();
+  drawMarks(); // last: the plots ask for their size, and a layout of all cut-outs takes its time
 }
 
 /** The marks above the line. */

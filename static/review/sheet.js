@@ -8,8 +8,8 @@ import { send } from "../base/socket.js";
 import { nameOf, stampOf, state } from "../base/state.js";
 
 /** @typedef {import("./review.js").Row} Row */
-/** Side of a cut-out [px of the image]; of a longer residual so many times its length. */
-const [SIDE, MOST, WIDER] = [96, 900, 2.4];
+/** Side of a cut-out [px of the image], doubled until it is so many times as long as the residual. */
+const [SIDE, MOST, WIDER] = [96, 768, 2.4];
 const KEYS = "ArrowLeft ArrowRight ArrowUp ArrowDown Home End Enter x X r R";
 
 /** @type {Map<string, HTMLButtonElement>} */
@@ -75,7 +75,7 @@ function mark(cell, { hovered, brushed, selected }) {
 
 /** @param {HTMLButtonElement} cell @param {Row} row @param {boolean} isReviewed */
 function fill(cell, { click, kind, right, down, length }, isReviewed) {
-  const side = Math.round(Math.min(MOST, Math.max(SIDE, WIDER * length)));
+  const side = Math.min(MOST, SIDE * 2 ** Math.max(0, Math.ceil(Math.log2((WIDER * length) / SIDE))));
   const { sec, nanosec } = stampOf(click.frame);
   const source = `api/crop.jpg?time=${sec}${String(nanosec).padStart(9, "0")}&u=${click.u_px.toFixed(2)}&v=${click.v_px.toFixed(2)}&side=${side}`;
   const words = `${nameOf(click.id)}: ${length.toFixed(1)} px${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;

@@ -37,8 +37,8 @@ from cocalib.web.channel.image_changes import ImageChanges
 from cocalib.web.channel.lens import LensService
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 from cocalib.web.channel.radar_survey import Survey
+from cocalib.web.crops import Crops
 from cocalib.web.exports import FieldError, format_rows, image_of
-from cocalib.web.frames import crop
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
 
@@ -74,7 +74,7 @@ _LANDING = (
     b'<!doctype html><meta charset="utf-8"><title>cocalib</title><link rel="icon" href="/icon.svg">'
     b'<p><a href="/">Open the page</a>'
 )
-_PAGE = "index.html"
+_PAGE, _CROPS = "index.html", "/api/crop.jpg"
 _CROP = re.compile(r"time=([0-9]{1,19})&u=(-?[0-9]{1,5}(?:\.[0-9]+)?)&v=(-?[0-9]{1,5}(?:\.[0-9]+)?)&side=([0-9]{1,3})")
 _INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
@@ -192,7 +192,8 @@ class Routes:
             make = lambda _query: _viser_page()  # noqa: E731
         if make is None:
             return refusal(404, "Not found.")
-        return await asyncio.get_running_loop().run_in_executor(None, make, query)
+        crops = self._downloads.crops.thread if path == _CROPS and self._downloads is not None else None
+        return await asyncio.get_running_loop().run_in_executor(crops, make, query)
 
 
 class _Downloads:
@@ -203,9 +204,13 @@ class _Downloads:
         self._recording = recording
         self._hub = hub
         self._view_file = _ViewFile(recording)
+        self.crops = Crops(recording, workspace.restored.folder)
+        self._unsubscribe = workspace.subscribe(self.crops.keep_marks)
 
     def end(self) -> None:
         """Write nothing more in the background."""
+        self._unsubscribe()
+        self.crops.end()
         self._view_file.end()
 
     def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
@@ -223,7 +228,7 @@ class _Downloads:
             "/api/board_corners.json": self._board_corners,
             "/api/image_changes.json": self._image_changes,
             "/api/check_point_image": self._check_point_image,
-            "/api/crop.jpg": self._crop,
+            _CROPS: self._crop,
             "/api/meanings.json": self._meanings,
             "/api/meaning.jpg": self._meaning,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
@@ -296,12 +301,10 @@ class _Downloads:
         match = _CROP.fullmatch(query)
         if match is None:
             return refusal(400, "Name the frame's stamp, the pixel and the side.")
-        times, stamp = self._recording.image_times, int(match[1])
-        index = int(np.searchsorted(times, stamp))
-        if not 0 <= index < len(times) or times[index] != stamp:
-            return refusal(404, "No image has this stamp.")
         try:
-            made = crop(self._recording.image_bytes(index).data, float(match[2]), float(match[3]), int(match[4]))
+            made = self.crops.get((int(match[1]), float(match[2]), float(match[3]), int(match[4])))
+        except KeyError:
+            return refusal(404, "No image has this stamp.")
         except ValueError as error:
             return refusal(404, str(error))
         return _reply(made, "image/jpeg", more=(("Cache-Control", "private, max-age=604800, immutable"),))

@@ -163,6 +163,7 @@ class RunningServer:
         if self._hub is not None:
             self._on_loop(self._hub.end())
             self._hub.steps.shutdown(wait=True, cancel_futures=True)
+            self._routes.withdraw()
         stop_viser(self._viser)
         self._link.close()
         self._executor.shutdown(wait=True, cancel_futures=True)

@@ -17,6 +17,8 @@ from calib_core.interchange.calibration_file import choose_check_point
 from calib_core.interchange.formats.registry import FORMATS, format_named
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.results import Calibration
+from cocalib.session.applying import History
+from cocalib.session.file.session_file import Restored
 from cocalib.session.state import Session
 from cocalib.web.port.routes import Reply, Routes
 from tests.image_recording import ImageRecording, grey_images
@@ -24,13 +26,24 @@ from tests.image_recording import ImageRecording, grey_images
 CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index in range(5))
 
 
+def workspace_of(session: Session, folder: Path) -> Any:
+    return SimpleNamespace(
+        session=session,
+        facts=SimpleNamespace(name="drive 7.mcap"),
+        camera_file=None,
+        restored=Restored(folder, History()),
+        subscribe=lambda _: lambda: None,
+    )
+
+
 @pytest.fixture
-def ask(project_root: Path) -> Callable[..., Reply]:
+def ask(project_root: Path, tmp_path: Path) -> Callable[..., Reply]:
     def answer(session: Session, address: str, recording: ImageRecording | None = None) -> Reply:
-        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
         routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
-        routes.admit(workspace, recording or ImageRecording(grey_images(1)), hub)
-        return asyncio.run(routes.answer(address))
+        routes.admit(workspace_of(session, tmp_path), recording or ImageRecording(grey_images(1)), hub)
+        reply = asyncio.run(routes.answer(address))
+        routes.withdraw()
+        return reply
 
     return answer
 
@@ -88,7 +101,7 @@ def test_rerun_is_offered_as_a_command_where_it_is_installed_and_has_a_window(fi
 
 
 def test_the_file_for_rerun_is_written_in_the_background_and_asked_for_until_it_is_there(
-    file, project_root, monkeypatch
+    file, project_root, monkeypatch, tmp_path
 ):
     goes_on, halfway = threading.Event(), threading.Event()
 
@@ -102,9 +115,8 @@ def test_the_file_for_rerun_is_written_in_the_background_and_asked_for_until_it_
     monkeypatch.setattr("cocalib.recorded_view.recorded_view", lambda *_given: None)
     session = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
     routes = Routes(project_root / "static")
-    workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive"), camera_file=None)
     hub: Any = SimpleNamespace(survey=None)
-    routes.admit(workspace, ImageRecording(grey_images(1)), hub)
+    routes.admit(workspace_of(session, tmp_path), ImageRecording(grey_images(1)), hub)
 
     def ask_for_it() -> Reply:
         return asyncio.run(routes.answer("/api/view.rrd"))
