@@ -3,7 +3,6 @@
 import os
 import re
 import struct
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,103 +10,45 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.errors import MessageError, RecordingError
+from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
-from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.source import PlainSource, cloud_channel, cloud_message, topic_of
 from calib_core.recordings.time.written_times import read_time
 
 MAGIC = b"\x02\x01\x04\x03\x06\x05\x08\x07"
-
-
 MAX_PACKET_BYTES = 1 << 20
-
-
 _HEADER = struct.Struct("<8s7I")
-
-
 _HEADER_SIZES = (_HEADER.size + 4, _HEADER.size)
 """With the number of the subframe, and without it (SDK 1 and xWR14xx)."""
-
-
 _TLV = struct.Struct("<II")
-
-
 _MAX_ITEMS = 64
-
-
 _POINTS, _SIDE_INFO = 1, 7
-
-
 _PAD_BYTES = 32
-
-
 _NAMES: Mapping[int, str] = {
     1: "points", 2: "range profile", 3: "noise profile", 4: "azimuth heat map", 5: "range-Doppler heat map", 6: "statistics",
     7: "SNR and noise", 8: "azimuth-elevation heat map", 9: "temperature",
 }  # fmt: skip
-
-
 _FLOATS = np.dtype([(name, "<f4") for name in ("right", "forward", "up", "velocity")])
-
-
 _FIXED = np.dtype([
     ("range_index", "<u2"), ("doppler_index", "<i2"), ("peak", "<u2"), ("right", "<i2"), ("forward", "<i2"), ("up", "<i2"),
 ])  # fmt: skip
-
-
 _SIDE = np.dtype([("snr", "<i2"), ("noise", "<i2")])
-
-
 _RETURNS = np.dtype([(name, "<f4") for name in ("x", "y", "z", "velocity", "snr")])
-
-
 _FIXED_RETURNS = np.dtype([(name, "<f4") for name in ("x", "y", "z", "power")])
-
-
 _SUFFIXES = (".bin", ".dat", ".raw", ".log", "")
-
-
 _FRAME = "radar"
-
-
-_LOOK_BYTES = 1 << 20
-
-
-_PIECE_BYTES = 1 << 16
-
-
+_LOOK_BYTES, _MAX_BYTES = 1 << 20, 1 << 30
 _DEPTH = 5
-
-
 _SAMPLED_FILES = 4  # of a folder below the one that was named
-
-
 _COMMANDS = re.compile(rb"mmwDemo:/>|^(?:sensorStart|sensorStop|profileCfg|frameCfg)\b", re.MULTILINE)
-
-
 _WORD = re.compile(re.escape(MAGIC))
-
-
 _ADC_NAME = re.compile(r"adc_?data|_raw_\d+$", re.IGNORECASE)
-
-
 _CYCLES_PER_S = 200e6
-
-
 _WRAP = 1 << 32
-
-
 _DEFAULT_PERIOD_S = 0.1
-
-
 _PERIODS_S = (0.005, 5.0)
-
-
 _UNSTEADY = 0.2
-
-
 _MAX_TABLE_BYTES = 1 << 26
 
 
@@ -177,20 +118,24 @@ def _parts(name: str) -> list[str]:
 
 def _is_stream(path: Path) -> bool:
     """Return whether a whole packet is near the beginning of a file."""
-    data = _head(path)
+    data = _content(path, _LOOK_BYTES)
     return any(packet_in(data[found.start() :]) is not None for found in _WORD.finditer(data))
 
 
-def _head(path: Path) -> bytes:
+def _content(path: Path, size: int = _MAX_BYTES) -> bytes:
     try:
+        if size == _MAX_BYTES < path.stat().st_size:
+            raise RecordingError(
+                f"{path}: has more than {_MAX_BYTES >> 20} MiB; cut it into parts and open them one by one"
+            )
         with path.open("rb") as file:
-            return file.read(_LOOK_BYTES)
+            return file.read(size)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; check its permissions") from error
 
 
 def _is_command_log(path: Path) -> bool:
-    head = _head(path)
+    head = _content(path, _LOOK_BYTES)
     return head.isascii() and _COMMANDS.search(head) is not None
 
 
@@ -202,7 +147,7 @@ def _refuse_other_data(path: Path) -> None:
     """
     if path.suffix.lower() not in _SUFFIXES:
         return
-    head = _head(path)
+    head = _content(path, _LOOK_BYTES)
     if _is_command_log(path):
         raise RecordingError(
             f"{path}: a log of a TI radar's configuration port: it holds commands, no detections; open the log of the data port"
@@ -215,28 +160,20 @@ def _refuse_other_data(path: Path) -> None:
 
 
 def _open(path: Path, chunks: Sequence[Path], radar_start: str | None) -> PlainSource:
-    stream = _Stream(chunks)
-    try:
-        scan = _Scan(stream)
-        stamped = stamp_packets(path, [packet for _, packet in scan.packets], radar_start, topic_of(path, "radar"))
-    except RecordingError:
-        stream.close()
-        raise
-    packets = [scan.packets[row] for row in stamped.rows]
+    stream = b"".join(map(_content, chunks))
+    scan = _scan(stream)
+    stamped = stamp_packets(path, [packet for _, packet in scan.packets], radar_start, topic_of(path, "radar"))
     times = stamped.times_ns
 
     def message(row: int) -> bytes:
-        place, packet = packets[row]
-        data = stream.up_to(place, packet.size)
-        if packet_in(data) != packet:
-            raise MessageError(f"{path.name}: the packet at byte {place} has changed since the file was opened")
+        place, packet = scan.packets[stamped.rows[row]]
+        data = stream[place : place + packet.size]
         return cloud_message(TimeNs(int(times[row])), _FRAME, points_of(packet, data))
 
-    source = PlainSource(
-        path, stream.size, _container(chunks, scan, stamped.clock), cloud_channel(topic_of(path, "radar")), times, message,
-        (*_damage_warnings(path, scan), *stamped.warnings), stream.close, stamped.assumptions,
+    return PlainSource(
+        path, len(stream), _container(chunks, scan, stamped.clock), cloud_channel(topic_of(path, "radar")), times, message,
+        (*_damage_warnings(path, scan), *stamped.warnings), None, stamped.assumptions,
     )  # fmt: skip
-    return source
 
 
 def _container(chunks: Sequence[Path], scan: "_Scan", clock: str) -> str:
@@ -264,89 +201,40 @@ def _damage_warnings(path: Path, scan: "_Scan") -> list[DataWarning]:
     ]
 
 
+@dataclass(slots=True)
 class _Scan:
-    """All packets of a stream, and the bytes in between.
-
-    Args:
-        stream: the bytes.
+    """What a stream holds.
 
     Attributes:
         packets: position and head of each whole packet.
         broken: number of packets that are damaged or cut off.
-        strange_bytes: number of other bytes, not counting padding.
+        strange_bytes: number of bytes between packets, unless all of them are zero.
     """
 
-    def __init__(self, stream: "_Stream") -> None:
-        self.packets: list[tuple[int, Packet]] = []
-        self.broken = self.strange_bytes = 0
-        after = 0
-        place = stream.find(_WORD, 0)
-        while place >= 0:
-            self._note_between(stream, after, place)
-            following = stream.find(_WORD, place + len(MAGIC))
-            end = min(following if following >= 0 else stream.size, place + MAX_PACKET_BYTES)
-            packet = packet_in(stream.up_to(place, end - place))
-            if packet is None:
-                self.broken += 1
-                after = max(after, end)
-            else:
-                self.packets.append((place, packet))
-                after = max(after, place + packet.size)
-            place = following
-        self._note_between(stream, after, stream.size)
-
-    def _note_between(self, stream: "_Stream", begin: int, end: int) -> None:
-        """Count the bytes between two packets, unless all of them are zero."""
-        pieces = (stream.up_to(index, min(_PIECE_BYTES, end - index)) for index in range(begin, end, _PIECE_BYTES))
-        if any(map(any, pieces)):
-            self.strange_bytes += end - begin
+    packets: "list[tuple[int, Packet]]" = field(default_factory=list)
+    broken: int = 0
+    strange_bytes: int = 0
 
 
-class _Stream:
-    """The bytes of one or more files, one after the other.
+def _scan(stream: bytes) -> _Scan:
+    scan, after = _Scan(), 0
+    places = [found.start() for found in _WORD.finditer(stream)]
+    for place, following in zip(places, [*places[1:], len(stream)], strict=True):
+        scan.strange_bytes += _strange(stream[after:place])
+        end = min(following, place + MAX_PACKET_BYTES)
+        packet = packet_in(stream[place:end])
+        if packet is None:
+            scan.broken += 1
+            after = max(after, end)
+        else:
+            scan.packets.append((place, packet))
+            after = max(after, place + packet.size)
+    scan.strange_bytes += _strange(stream[after:])
+    return scan
 
-    Args:
-        paths: the files.
-    """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._files = [FileBytes(path) for path in paths]
-        self._stretches = [FileStretch(file, 0, file.size_bytes) for file in self._files]
-        self._starts = np.cumsum([0, *(file.size_bytes for file in self._files)]).tolist()
-        self.size: int = self._starts[-1]
-
-    def up_to(self, offset: int, size: int) -> bytes:
-        """Return at most size bytes from offset."""
-        parts = []
-        while size > 0 and offset < self.size:
-            number = bisect_right(self._starts, offset) - 1
-            part = self._stretches[number].up_to(offset - self._starts[number], size)
-            parts.append(part)
-            offset, size = offset + len(part), size - len(part)
-            if not part:
-                break
-        return b"".join(parts)
-
-    def find(self, pattern: "re.Pattern[bytes]", start: int) -> int:
-        """Return where the pattern is found next, also across two files; -1 where it is not."""
-        reach = len(MAGIC) - 1
-        while start < self.size:
-            number = bisect_right(self._starts, start) - 1
-            begin, end = self._starts[number], self._starts[number + 1]
-            inside = self._stretches[number].find(pattern, start - begin)
-            if inside >= 0:
-                return int(begin + inside)
-            first = max(start, end - reach)
-            across = pattern.search(self.up_to(first, 2 * reach))
-            if across:
-                return int(first + across.start())
-            start = end
-        return -1
-
-    def close(self) -> None:
-        """Close the files."""
-        for file in self._files:
-            file.close()
+def _strange(between: bytes) -> int:
+    return len(between) if between.strip(b"\0") else 0
 
 
 @dataclass(frozen=True, slots=True)
