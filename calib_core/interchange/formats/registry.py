@@ -33,7 +33,6 @@ from calib_core.interchange.formats.pjlab import PJLAB
 from calib_core.interchange.formats.static_transform import TF2, TF2_LAUNCH_PY
 from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.formats.tf_echo import TF_ECHO
-from calib_core.interchange.formats.tum_pose import TUM_POSE
 from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
@@ -75,7 +74,7 @@ _TRIED_FIRST = (
 # Formats that are only read; each is recognized by keys or lines that no other tool writes.
 _ONLY_READ = (
     *(SCALE, SEGMENTS, EASY_HANDEYE, AUTOWARE_AI),
-    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO, TUM_POSE),
+    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO),
     *(KOIDE3, OPENLABEL, Reads(recognizes_foxglove, read_joints)),
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )

@@ -49,7 +49,10 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     except ValueError as error:
         raise InputError(f"{source}: not a matrix ({error}); give 3 or 4 rows of 4 numbers") from None
     if len(numbers) not in (12, 16) or not (np.abs(numbers) <= _LARGEST).all():
-        raise InputError(f"{source}: expected 12 or 16 finite numbers, found {len(numbers)}; give 3 or 4 rows of 4")
+        raise InputError(
+            f"{source}: expected 12 or 16 finite numbers, found {len(numbers)}; give 3 or 4 rows of 4, or convert the file with "
+            "cocalib import FILE"
+        )
     try:
         rows = upper_rows(numbers.reshape(-1, 4))
     except ValueError as error:

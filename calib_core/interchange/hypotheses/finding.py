@@ -119,7 +119,10 @@ def _in_rows(rows: list[np.ndarray], search: _Search) -> None:
         return
     for index, row in enumerate(rows):
         keys: tuple[object, ...] = () if len(rows) == 1 else (f"line {index + 1}",)
-        _as_numbers(row[1:] if row.shape == (8,) else row, keys, (), search)
+        if row.shape == (8,):  # a time before it, as in TUM's trajectories, whose quaternions end with w
+            search.add(keys, tuple(one for one in seven_number_readings(row[1:]) if one.turned.key == "xyz-xyzw"), ())
+        else:
+            _as_numbers(row, keys, (), search)
 
 
 def _look(value: Any, keys: tuple[object, ...], texts: tuple[str, ...], search: _Search) -> None:

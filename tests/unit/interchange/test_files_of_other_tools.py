@@ -174,7 +174,7 @@ def test_json_of_another_tool_that_cannot_be_read_is_refused_in_words(content, w
         ("$ tf2_echo base_link camera\n" + echo(POSITION, TURN), "not a radar and a camera"),
         ("$ tf2_echo base_link radar\n" + echo(POSITION, TURN), "not a radar and a camera"),
         (echo([0.1, 0.2], TURN), "Translation: expected 3 numbers, found 2"),
-        ("12.5 0.1 -0.2 0.3 0 0 0 1\n", "does not tell which way it goes"),
+        ("12.5 0.1 -0.2 0.3 0 0 0 1\n", "convert the file with cocalib import"),
         ("calib_time: 1\nR: 1 0 0 0 1 0 0 0 1\nR: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n", "R appears twice"),
         ("calib_time: 1\nR: 1 0 0 0 1 0 0 0 1\nT: 0 0\n", "T: expected 3 numbers, found 2"),
         ("P2: 0 0 0 0 0 0 0 0 0 0 0 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n", "no camera matrix"),
