@@ -313,7 +313,7 @@ def posed_between(parent: str, child: str, stated: FrameNames | None, numbers: W
         radar_first = not (child_is_radar or (parent_is_camera and not looks_like_radar(parent)))
         radar, camera = (parent, child) if radar_first else (child, parent)
         if not (looks_like_radar(radar) and not looks_like_radar(camera)):
-            _refuse_another_sensor(radar, "radar", "--radar")
+            refuse_another_sensor(radar, "radar", "--radar")
             assumptions.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
     pose = replace(numbers, direction="radar_from_camera" if parent == radar else "camera_from_radar", axes="optical")
     axes: Axes = "optical"
@@ -323,14 +323,14 @@ def posed_between(parent: str, child: str, stated: FrameNames | None, numbers: W
         frames = FrameNames(radar, camera)
     else:
         if not looks_like_camera(camera):
-            _refuse_another_sensor(camera, "camera", "--camera-frame")
+            refuse_another_sensor(camera, "camera", "--camera-frame")
         axes = "optical" if _fits_optical_alone(pose) else "link"
         assumptions.append(_ASSUMED_AXES[axes].format(camera))
         frames = FrameNames(radar, camera if axes == "optical" else _optical_name(camera))
     return Roles(replace(pose, axes=axes), frames, tuple(assumptions))
 
 
-def _refuse_another_sensor(frame: str, kind: str, flag: str) -> None:
+def refuse_another_sensor(frame: str, kind: str, flag: str) -> None:
     """Refuse to take a frame for the radar's or the camera's that is named like the vehicle's or another sensor's.
 
     Raises:

@@ -255,7 +255,7 @@ TOOLS = (
         "PJLab of a lidar",
         "lidar-to-camera.json",
         _pjlab("top_center_lidar", "center_camera", CAMERA_FROM_RADAR),
-        refused="top_center_lidar to center_camera",
+        refused="top_center_lidar",
     ),
     Calibration("koide3", "calib.json", _koide3(T_lidar_camera=POSE_7), holds_camera="lens"),
     Calibration("koide3, initial guess", "calib.json", _koide3(init_T_lidar_camera=POSE_7), refused="initial guess"),

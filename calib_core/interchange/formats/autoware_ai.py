@@ -9,7 +9,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid_matrix
+from calib_core.interchange.pose_parts import direction_by_facing, rigid_rows
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "CameraExtrinsicMat"
@@ -30,20 +30,20 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         InputError: it contains intrinsics only, or goes the other way by where the camera would look.
     """
     values = content.mapping
-    matrix = rigid_matrix(values[_KEY], source=source, place=_KEY)
-    if np.abs(matrix - np.eye(4)).max() == 0:
+    matrix = rigid_rows(values[_KEY], source=source, place=_KEY)
+    if np.abs(matrix - np.eye(3, 4)).max() == 0:
         raise InputError(
             f"{source}: {_KEY} is the identity, as the tool writes for intrinsics alone; give the file of the extrinsic "
             "calibration (as intrinsics: --camera FILE)"
         )
-    if direction_by_facing(matrix[:3, :3]) == "camera_from_radar":
+    if direction_by_facing(matrix[:, :3]) == "camera_from_radar":
         raise InputError(
             f"{source}: {_KEY}: as the camera's pose in the radar the camera looks away from it, and would not if the matrix "
             "were inverted; invert it, or write it to a text file as camera_from_radar"
         )
     calibration = ImportedCalibration(
         "autoware-ai",
-        WrittenPose("matrix", matrix[:3, :3], matrix[:3, 3], "radar_from_camera"),
+        WrittenPose("matrix", matrix[:, :3], matrix[:, 3], "radar_from_camera"),
         assumptions=(_ASSUMPTION,),
     ).checked(source)
     return with_camera(calibration, _camera(values, source=source), source=source)

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.cameras.kalibr import kalibr_camera_text
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.rotations import upper_rows
+from calib_core.interchange.pose_parts import rigid_rows
 from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
@@ -51,11 +49,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(
             f"{source}: T_cam_radar appears in {key}, {', '.join(map(str, others))}; keep only the intended camera"
         )
-    matrix = floats(chain[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
-    try:
-        rows = upper_rows(np.reshape(matrix, (4, 4)))
-    except ValueError as error:
-        raise InputError(f"{source}: {key}.T_cam_radar: {error}; correct it") from None
+    rows = rigid_rows(chain[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar")
     cameras = find_cameras({key: chain[key]}, source=source) if "intrinsics" in chain[key] else ()
     return ImportedCalibration(
         "kalibr",

@@ -9,7 +9,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.kitti import keyed_lines, numbers_of
-from calib_core.interchange.formats.pose_parts import rigid
+from calib_core.interchange.pose_parts import rigid
 from calib_core.interchange.syntax.content import Content
 
 _CAMERAS = "calib_cam_to_cam.txt"

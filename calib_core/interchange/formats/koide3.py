@@ -9,7 +9,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import pinhole_matrix
+from calib_core.interchange.pose_parts import pinhole_matrix
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "T_lidar_camera"

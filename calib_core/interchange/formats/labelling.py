@@ -10,7 +10,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
 from calib_core.interchange.cameras.fields import floats, named_numbers
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import pinhole_matrix, rigid
+from calib_core.interchange.pose_parts import pinhole_matrix, rigid
 from calib_core.interchange.syntax.content import Content
 
 _AS_RADAR = "the sensor that the file calls {} is taken to be the radar, x forward, y left, z up"

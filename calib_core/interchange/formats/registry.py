@@ -17,7 +17,6 @@ from calib_core.interchange.formats.autoware_ai import AUTOWARE_AI
 from calib_core.interchange.formats.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.colmap import COLMAP
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
-from calib_core.interchange.formats.easy_handeye import EASY_HANDEYE
 from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
@@ -28,17 +27,15 @@ from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RADAR_OFFSET, KALIBR_CHAIN, KITTI_CAMERAS
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
-from calib_core.interchange.formats.openlabel import OPENLABEL
 from calib_core.interchange.formats.pjlab import PJLAB
 from calib_core.interchange.formats.static_transform import TF2, TF2_LAUNCH_PY
 from calib_core.interchange.formats.text_matrix import MATRIX
-from calib_core.interchange.formats.tf_echo import TF_ECHO
 from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.foxglove import recognizes_foxglove
 from calib_core.interchange.trees.posed_in_tree import read_joints
+from calib_core.interchange.trees.reading import JOINTS
 from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
 FORMATS: tuple[Format, ...] = (
@@ -73,9 +70,8 @@ _TRIED_FIRST = (
 )
 # Formats that are only read; each is recognized by keys or lines that no other tool writes.
 _ONLY_READ = (
-    *(SCALE, SEGMENTS, EASY_HANDEYE, AUTOWARE_AI),
-    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO),
-    *(KOIDE3, OPENLABEL, Reads(recognizes_foxglove, read_joints)),
+    *(SCALE, SEGMENTS, AUTOWARE_AI, KITTI_RAW, KITTI_ODOMETRY, KOIDE3),
+    Reads(lambda content: any(recognizes(content) for recognizes, _ in JOINTS), read_joints),
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )
 _RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})

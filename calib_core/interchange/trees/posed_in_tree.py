@@ -16,6 +16,7 @@ from calib_core.interchange.format import (
     looks_like_lidar,
     of_lidar,
     posed_between,
+    refuse_another_sensor,
 )
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.statement import stated_check_point, stated_frames, with_statement
@@ -56,7 +57,7 @@ def calibration_of_joints(content: Content, frames: WantedFrames, *, source: str
     Raises:
         InputError: the pose cannot be found in it; the message says what to do.
     """
-    part = tree_in(content, content.text, source)
+    part = tree_in(content, source)
     if part is None:
         return None
     if not part.joints:
@@ -81,7 +82,9 @@ def _of_one_joint(part: TreePart, stated: FrameNames | None) -> ImportedCalibrat
     written = joint.written or WrittenPose("matrix", moved.rotation, moved.translation_m, "radar_from_camera")
     camera = next((one for one in part.sensors if one.kind == "camera" and one.axes == "optical"), None)
     if stated is None and camera is not None and camera.frame in (joint.parent, joint.child):
-        stated = FrameNames(joint.parent if camera.frame == joint.child else joint.child, camera.frame)
+        other = joint.parent if camera.frame == joint.child else joint.child
+        refuse_another_sensor(other, "radar", "--radar")
+        stated = FrameNames(other, camera.frame)
     roles = posed_between(joint.parent, joint.child, stated, written)
     found = ImportedCalibration(
         part.format,

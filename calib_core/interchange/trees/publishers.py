@@ -44,12 +44,13 @@ def recognizes_publishers(content: Content) -> bool:
     return content.syntax == "lines" and (PUBLISHER in content.text or "generate_launch_description" in content.text)
 
 
-def read_publishers(content: Content, text: str, source: str) -> TreePart:
+def read_publishers(content: Content, source: str) -> TreePart:
     """Read the transform of every publisher.
 
     Raises:
         InputError: one has no pose between two frames.
     """
+    text = content.text
     if content.syntax == "xml":
         name, commands = "tf2-launch-xml", list(_in_xml(text, source))
         if not any(f'exec="{PUBLISHER}"' in line for line in text.splitlines()):

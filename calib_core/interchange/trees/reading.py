@@ -1,18 +1,22 @@
 """Read the frame tree in one file, several files or a folder: URDF, transforms of ROS, Autoware, Apollo, nuScenes, rigs."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
 from calib_core.interchange.trees.autoware import read_autoware, recognizes_autoware
 from calib_core.interchange.trees.driveworks import read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.easy_handeye import read_easy_handeye, recognizes_easy_handeye
 from calib_core.interchange.trees.foxglove import read_foxglove, recognizes_foxglove
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor, TreePart, joined
 from calib_core.interchange.trees.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
+from calib_core.interchange.trees.openlabel import read_openlabel, recognizes_openlabel
+from calib_core.interchange.trees.pjlab import read_extrinsics, recognizes_extrinsics
 from calib_core.interchange.trees.publishers import read_publishers, recognizes_publishers
 from calib_core.interchange.trees.stamped import read_stamped, recognizes_stamped
+from calib_core.interchange.trees.tf_echo import read_tf_echo, recognizes_tf_echo
 from calib_core.interchange.trees.urdf import read_urdf, recognizes_urdf
 
 
@@ -38,24 +42,30 @@ class TreeFile:
         return decoded(self.data, source=self.source)
 
 
-def tree_in(content: Content, text: str, source: str) -> TreePart | None:
+JOINTS: tuple[tuple[Callable[[Content], bool], Callable[[Content, str], TreePart]], ...] = (
+    (recognizes_urdf, lambda content, source: read_urdf(content.text, source)),
+    (recognizes_publishers, read_publishers),
+    (recognizes_stamped, lambda content, source: read_stamped(content.text, source)),
+    (recognizes_autoware, lambda content, source: read_autoware(content.text, source)),
+    (recognizes_driveworks, read_driveworks),
+    (recognizes_easy_handeye, read_easy_handeye),
+    (recognizes_extrinsics, read_extrinsics),
+    (recognizes_tf_echo, read_tf_echo),
+    (recognizes_openlabel, read_openlabel),
+    (recognizes_foxglove, read_foxglove),
+)
+"""How each format with joints is recognized and read."""
+
+
+def tree_in(content: Content, source: str) -> TreePart | None:
     """Return the joints of one file that needs no other; None if it contains no joints.
 
     Raises:
         InputError: it contains joints that cannot be read.
     """
-    if recognizes_urdf(content):
-        return read_urdf(text, source)
-    if recognizes_publishers(content):
-        return read_publishers(content, text, source)
-    if recognizes_stamped(content):
-        return read_stamped(text, source)
-    if recognizes_autoware(content):
-        return read_autoware(text, source)
-    if recognizes_driveworks(content):
-        return read_driveworks(content, source)
-    if recognizes_foxglove(content):
-        return read_foxglove(content, source)
+    for recognizes, read in JOINTS:
+        if recognizes(content):
+            return read(content, source)
     if recognizes_poses(content) and len(content.value) > 2:
         return next(_posed_by_tables([(content, source)], {}))
     return None
@@ -95,7 +105,8 @@ def joined_tree(files: Sequence[TreeFile], recorded: Sequence[Joint]) -> FrameTr
             elif recognizes_poses(content):
                 poses.append((content, file.source))
             else:
-                part = tree_in(content, file.text.lstrip("\ufeff"), file.source) or cameras_named_in(content)
+                whole = replace(content, text=file.text.lstrip("\ufeff"))
+                part = tree_in(whole, file.source) or cameras_named_in(content)
                 if part is None:
                     continue
                 parts.append(part)

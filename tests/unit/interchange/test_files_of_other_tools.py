@@ -12,8 +12,8 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.exporting import export
-from calib_core.interchange.formats.pose_parts import direction_by_facing
 from calib_core.interchange.importing import read_any, read_any_file
+from calib_core.interchange.pose_parts import direction_by_facing
 from calib_core.interchange.trees.frame_choice import WantedFrames
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
@@ -114,7 +114,7 @@ def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"a": extrinsic("radar", "camera", np.transpose(MATRIX).tolist())}, "last row must be 0 0 0 1; is the matrix"),
+        ({"a": extrinsic("radar", "camera", np.transpose(MATRIX).tolist())}, "the matrix is transposed"),
         ({"a": extrinsic("radar", "camera", [[1, 0], [0, 1]])}, "expected 16 numbers, found 4"),
         ({"a": extrinsic("radar", "camera", np.diag([1, 1, -1, 1]).tolist())}, "mirrored"),
         (
@@ -123,13 +123,13 @@ def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
         ),
         ({"results": {"T_lidar_camera": [1, 2, 3]}}, "expected 7 numbers, found 3"),
         ({"results": {"T_lidar_camera": [0, 0, 0, 1, 1, 1, 1]}}, "has length 2, not 1"),
-        (labelled({"radar": placed("a", np.eye(4)), "camera": placed("b", MATRIX)}), "no common parent"),
+        (labelled({"radar": placed("a", np.eye(4)), "camera": placed("b", MATRIX)}), "not connected"),
         (labelled({"radar": placed("camera", np.eye(4)), "camera": placed("radar", MATRIX)}), "form a circle"),
         (
             labelled({"radar": placed("", np.eye(4)), "cam1": placed("", MATRIX), "cam2": placed("", MATRIX)}),
-            "2 cameras",
+            "2 camera frames",
         ),
-        (labelled({"camera": placed("", np.eye(4))}), "0 radars"),
+        (labelled({"camera": placed("", np.eye(4))}), "is no radar by its name"),
         (
             labelled({"radar": placed("", np.eye(4)), "camera": {"pose_wrt_parent": {"euler_angles": [0, 0, 0]}}}),
             "neither",
@@ -171,8 +171,8 @@ def test_json_of_another_tool_that_cannot_be_read_is_refused_in_words(content, w
         (echo(POSITION, TURN) + echo([0.2, -0.2, 0.3], TURN), "changes from one print to the next"),
         (echo(POSITION, TURN, "- Rotation: in RPY (degree) [1, 2, 3]\n"), "disagree"),
         (echo(POSITION, [0, 0, 0, 1]), "names no frames"),
-        ("$ tf2_echo base_link camera\n" + echo(POSITION, TURN), "not a radar and a camera"),
-        ("$ tf2_echo base_link radar\n" + echo(POSITION, TURN), "not a radar and a camera"),
+        ("$ tf2_echo base_link camera\n" + echo(POSITION, TURN), "--radar base_link"),
+        ("$ tf2_echo base_link radar\n" + echo(POSITION, TURN), "--camera-frame base_link"),
         (echo([0.1, 0.2], TURN), "Translation: expected 3 numbers, found 2"),
         ("12.5 0.1 -0.2 0.3 0 0 0 1\n", "convert the file with cocalib import"),
         ("calib_time: 1\nR: 1 0 0 0 1 0 0 0 1\nR: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n", "R appears twice"),

@@ -7,12 +7,13 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.fields import named_numbers
-from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import between_named_frames
+from calib_core.interchange.format import WrittenPose, looks_like_radar
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.frame_tree import Joint, Place, TreePart
 
 
-def _recognizes(content: Content) -> bool:
+def recognizes_easy_handeye(content: Content) -> bool:
+    """Return whether a file is such a calibration."""
     given = _parameters(content.mapping)
     return "tracking_base_frame" in given and bool({"transform", "transformation"} & set(content.mapping))
 
@@ -23,11 +24,11 @@ def _parameters(values: Mapping[str, Any]) -> Mapping[str, Any]:
     return nested if isinstance(nested, Mapping) else values
 
 
-def _read(content: Content, source: str) -> ImportedCalibration:
+def read_easy_handeye(content: Content, source: str) -> TreePart:
     """Read the pose of the tracking frame in the robot's base, or in its effector if the camera is on the hand.
 
     Raises:
-        InputError: the two frames are not a radar and a camera by name, or a number is missing.
+        InputError: a frame has no name, neither is a radar by name, or a number is missing.
     """
     given = _parameters(content.mapping)
     kind = str(given.get("calibration_type") or "")
@@ -36,9 +37,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     child = str(given.get("tracking_base_frame") or "")
     if not parent or not child:
         raise InputError(f"{source}: parameters: the frame of the robot or of the camera has no name; name both")
+    if not looks_like_radar(parent) and not looks_like_radar(child):
+        raise InputError(
+            f"{source}: is the pose of {child!r} in {parent!r}, and by name neither is a radar; rename the radar's frame, or "
+            "give the transform between radar and camera"
+        )
     name, translation_m, rotation = _numbers(content.mapping, source=source)
     written = WrittenPose("quaternion_xyzw", np.array(rotation), np.array(translation_m), "radar_from_camera")
-    return between_named_frames(name, written, parent, child, source=source)
+    return TreePart(name, (Joint.posed(parent, child, written, Place(source)),))
 
 
 def _numbers(values: Mapping[str, Any], *, source: str) -> tuple[str, tuple[float, ...], tuple[float, ...]]:
@@ -53,6 +59,3 @@ def _numbers(values: Mapping[str, Any], *, source: str) -> tuple[str, tuple[floa
         named_numbers(block.get("translation"), "xyz", source=source, place="transform.translation"),
         named_numbers(block.get("rotation"), "xyzw", source=source, place="transform.rotation"),
     )
-
-
-EASY_HANDEYE = Reads(_recognizes, _read)

@@ -1,16 +1,18 @@
 """What `tf_echo` (ROS 1) and `tf2_echo` (ROS 2) print: the pose of the second frame in the first."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
+from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.formats.pose_parts import between_named_frames, direction_by_facing, rigid
+from calib_core.interchange.format import WrittenPose
+from calib_core.interchange.pose_parts import direction_by_facing, rigid
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.frame_tree import Joint, Place, TreePart
 
 _LIST = r"\[([^\]]*)\]"
 _TRANSLATION = re.compile(rf"Translation:\s*{_LIST}")
@@ -31,11 +33,12 @@ class _Printed:
     transform: RigidTransform
 
 
-def _recognizes(content: Content) -> bool:
+def recognizes_tf_echo(content: Content) -> bool:
+    """Return whether a text is such an output."""
     return content.syntax == "lines" and bool(_TRANSLATION.search(content.text) and _QUATERNION.search(content.text))
 
 
-def _read(content: Content, source: str) -> ImportedCalibration:
+def read_tf_echo(content: Content, source: str) -> TreePart:
     """Read the pose, and the frame names if the command or its waiting line is in the text.
 
     Raises:
@@ -48,16 +51,19 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     for other in printed[1:]:
         _refuse_moving(first.transform, other.transform, source=source)
     if named is not None:
-        return between_named_frames("tf-echo", first.pose, named[1], named[2], source=source, notes=(_PRINTED,))
+        return TreePart("tf-echo", (Joint.posed(named[1], named[2], first.pose, Place(source)),), notes=(_PRINTED,))
     direction = direction_by_facing(first.transform.rotation)
     if direction is None:
         raise InputError(
             f"{source}: the printed text names no frames; put the command above it (tf2_echo RADAR_FRAME CAMERA_FRAME)"
         )
-    order = "tf2_echo RADAR CAMERA" if direction == "radar_from_camera" else "tf2_echo CAMERA RADAR"
-    assumption = f"the text names no frames; assumed {order}, because its optical axis then looks where the radar does"
-    pose = replace(first.pose, direction=direction)
-    return ImportedCalibration("tf-echo", pose, assumptions=(assumption,), notes=(_PRINTED,)).checked(source)
+    usual = FrameNames()
+    ends = (usual.radar, usual.camera) if direction == "radar_from_camera" else (usual.camera, usual.radar)
+    assumption = (
+        f"the text names no frames; assumed tf2_echo {' '.join(ends)}: its optical axis then looks where the radar does"
+    )
+    joint = Joint.posed(ends[0], ends[1], first.pose, Place(source))
+    return TreePart("tf-echo", (joint,), notes=(_PRINTED,), assumptions=(assumption,))
 
 
 def _all_printed(text: str, *, source: str) -> list[_Printed]:
@@ -101,6 +107,3 @@ def _refuse_moving(first: RigidTransform, other: RigidTransform, *, source: str)
 def _apart_deg(a: RigidTransform, b: RigidTransform) -> float:
     cosine = (np.trace(a.rotation.T @ b.rotation) - 1.0) / 2.0
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-
-
-TF_ECHO = Reads(_recognizes, _read)
