@@ -18,7 +18,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.appearance import Appearance, appearance_of, likeness_elsewhere, with_appearance
-from calib_core.proposing.common_width import CommonWidth, at_width, common_width
+from calib_core.proposing.chance import OTHER_WIDTHS, Chance, at_width, chance_of
 from calib_core.proposing.dwell_views import has_changed
 from calib_core.proposing.proposing import LEAST_CONFIDENCE
 from calib_core.words.outcomes import outcome_remark
@@ -96,11 +96,11 @@ def _at_other_widths(
     stopped: Callable[[], bool],
 ) -> tuple[tuple[DwellView, ...], Proposals]:
     """Propose at the width that what changed in the images has in common; what was found before if it may be chance."""
-    width = common_width(found[0], camera, options, stopped=stopped)
-    if width is None or width.probability < LEAST_CONFIDENCE:
+    chance = chance_of(found[0], camera, options, widths=OTHER_WIDTHS, stopped=stopped)
+    if chance is None or chance.probability < LEAST_CONFIDENCE:
         return found
-    views = tuple(at_width(view, frames, camera, width.reflector_m) for view in found[0])
-    return views, proposals_of(views, camera, options, width=width)
+    views = tuple(at_width(view, frames, chance.wider) for view in found[0])
+    return views, proposals_of(views, camera, options, chance=chance)
 
 
 def proposed_again(
@@ -221,7 +221,8 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
 
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
 _FIRST, _EVERY = 4, 4
-"""From so many dwells on there may be proposals: after each dwell until there is one, then after every fourth."""
+"""From so many dwells on there may be proposals, tried each time twice as many are seen; while a look is carried, after every
+fourth."""
 _LOOKS = 3
 """The first clicks show what the reflector looks like; with these, further ones tell where it is, but nothing new of its look."""
 _log = logging.getLogger(__name__)
@@ -328,7 +329,7 @@ class ProposingJob:
         self._closed = False
         self._seen: tuple[DwellView, ...] = ()
         self._seen_for: ProposingWish | None = None
-        self._width: CommonWidth | None = None
+        self._chance: Chance | None = None
         self._appearances: tuple[tuple[object, ...], list[Appearance]] = ((), [])
         self._carried: list[DwellView] = []
         self._carried_from: list[tuple[object, ...]] = []
@@ -382,7 +383,7 @@ class ProposingJob:
     def _answer(self, wish: ProposingWish) -> None:
         """Look at the images unless that is done; then propose, and carry what was clicked."""
         if self._seen_for is None or not _same_images(self._seen_for, wish):
-            self._width = None
+            self._chance = None
             self._set(wish, stage="looking", done=0, count=len(wish.placements), problem="", hint="")
             found = find_proposals(
                 self._recording,
@@ -398,7 +399,7 @@ class ProposingJob:
                 said = outcome_remark(found)
                 self._set(wish, Proposals(()), stage="failed", problem=str(said.message), hint=str(said.hint))
                 return
-            self._seen, self._seen_for, self._width = found[0], wish, found[1].width
+            self._seen, self._seen_for, self._chance = found[0], wish, found[1].chance
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
             self._appearances = ((), [])
         self._carry(wish)
@@ -417,7 +418,8 @@ class ProposingJob:
                 self._carried, self._carried_from = list(self._seen), [key] * len(self._seen)
             left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
             if newest is not proposed_for or since >= _EVERY or not left:
-                self._propose(newest, self._carried)
+                known = self._snapshot.proposals.chance if newest is proposed_for and left else None
+                self._propose(newest, self._carried, chance=known if newest.confirmed else self._chance)
                 proposed_for, since = newest, 0
                 left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
             done = len(self._seen) - len(left)
@@ -440,18 +442,19 @@ class ProposingJob:
         wish = self._wish
         if wish is None or isinstance(progress, str):
             return
-        waiting = not self._snapshot.proposals.ranked
-        if progress.done >= _FIRST and (waiting or progress.done % _EVERY == 0):
+        if progress.done >= _FIRST and progress.done & (progress.done - 1) == 0:
             self._propose(wish, progress.views, done=progress.done, count=progress.count)
         else:
             self._set(wish, done=progress.done, count=progress.count)
 
-    def _propose(self, wish: ProposingWish, views: Sequence[DwellView], **changes: object) -> None:
+    def _propose(
+        self, wish: ProposingWish, views: Sequence[DwellView], *, chance: Chance | None = None, **changes: object
+    ) -> None:
         if wish.camera is None:
             return
         self._wait()
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
-        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed, width=self._width)
+        proposals = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed, chance=chance)
         self._set(wish, proposals, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:

@@ -30,7 +30,7 @@ def automatic_figures(proposals: Proposals, views: Sequence[DwellView], drawn: D
 
     "auto refused" is 1 if there is no answer; like the command, this refuses poses, too.
     """
-    outcome = automatic_clicks(proposals, views, drawn.recording.camera, CalibrationOptions())
+    outcome = automatic_clicks(proposals, len(views))
     if isinstance(outcome, Unsolvable):
         return {"auto refused": 1.0}
     pose = pose_figures("auto", outcome.clicks, drawn, refuses=lambda one: refusal_of(one) is not None)
@@ -62,12 +62,12 @@ def measure_mismatched(folder: Path, first: int, recordings: int, trial: int) ->
     shift = int(rng.integers(1, count)) if trial % 4 == 0 else 0
     mixed = tuple(_seen_at(images[i], radar[(i + shift) % count]) for i in range(count))
     proposals = proposals_of(mixed, camera, CalibrationOptions())
-    outcome = automatic_clicks(proposals, mixed, camera, CalibrationOptions())
+    outcome = automatic_clicks(proposals, len(mixed))
     accepted = not isinstance(outcome, Unsolvable)
     return {
         "own": float(trial % 4 == 0),
         "accepted": float(accepted),
-        "agreement": proposals.agreement,
+        "agreement": 0.0 if proposals.agreement is None else proposals.agreement.share,
         "confidence": 0.0 if isinstance(outcome, Unsolvable) else outcome.confidence,
     }
 

@@ -57,7 +57,11 @@ def measure_drawn(drawn: Drawn) -> Figures:
     clicked = after_one_click(first, views, drawn)
     return (
         placement_figures(drawn)
-        | {"agreement": first.agreement, "rival": first.rival_agreement}
+        | (
+            {}
+            if first.agreement is None
+            else {"agreement": first.agreement.share, "rival": first.agreement.rival_share}
+        )
         | proposal_figures("without", first.ranked, drawn)
         | pose("true", drawn.recording.clicks)
         | pose("without", accepted_clicks(first.ranked, drawn))

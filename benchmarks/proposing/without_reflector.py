@@ -75,14 +75,14 @@ def _without_reflector(recording: SimulatedRecording) -> SimulatedRecording:
 def _measured(placements: Sequence[Placement], frames: FrameSource, camera: Camera) -> Figures:
     views = dwell_views(placements, frames, camera)
     proposals = proposals_of(views, camera, CalibrationOptions())
-    outcome = automatic_clicks(proposals, views, camera, CalibrationOptions())
+    outcome = automatic_clicks(proposals, len(views))
     sure = max((one.confidence for one in proposals.ranked), default=0.0)
     return {
         "placements": float(len(placements)),
         "proposed": float(len(proposals.ranked)),
         "surest": sure,
         "accepted": float(not isinstance(outcome, Unsolvable)),
-        "agreement": proposals.agreement,
+        "agreement": 0.0 if proposals.agreement is None else proposals.agreement.share,
     }
 
 

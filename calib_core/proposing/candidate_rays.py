@@ -92,16 +92,6 @@ class CandidateRays:
     def __len__(self) -> int:
         return len(self.missing)
 
-    def with_radar_of(self, rows: Indices) -> "CandidateRays":
-        """Return the same images, with the radar positions of other dwells (n,)."""
-        return replace(
-            self,
-            positions_radar_m=self.positions_radar_m[rows],
-            polar=self.polar[rows],
-            slopes=self.slopes[rows],
-            sigma_polar=self.sigma_polar[rows],
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class _Choice:

@@ -10,9 +10,7 @@ Several rough poses are refined at once (expectation maximization): each candida
 given the pose; each step then solves for rotation, camera position and the scales of the radar's angles, with the mounting as
 prior. Tolerances shrink from step to step, and the noise level that explains a recording best is kept.
 
-How far chance goes is measured on the recording itself: the radar's positions are dealt to other dwells, neighbours
-in time too, as whoever carries a reflector down an aisle would be taken for right by the order alone. And a person
-who goes from place to place is seen by the radar and in the images alike; but where a reflector is large enough in
+A person who goes from place to place is seen by the radar and in the images alike; but where a reflector is large enough in
 the image its three sheets meet in a point, and a person's clothes rarely do.
 """
 
@@ -112,6 +110,8 @@ class PoseAgreement:
         probability: (n, k) that each candidate is the reflector, judged by the other dwells.
         rival_probability: (n, k) the same under the rival.
         off_sigma: (n, k) distance of each candidate from where the other dwells predict it, in standard deviations.
+        share: of the dwells that have candidates, how many agree on the pose.
+        rival_share: the same for the rival.
         trials: how many rotations were compared.
     """
 
@@ -122,6 +122,8 @@ class PoseAgreement:
     probability: Points2
     rival_probability: Points2
     off_sigma: Points2
+    share: float
+    rival_share: float
     trials: int
 
     def __post_init__(self) -> None:
@@ -136,14 +138,6 @@ class PoseAgreement:
     def pose_probability(self) -> float:
         """Probability of the pose against its rival."""
         return float(1.0 / (1.0 + np.exp(min((self.rival_score - self.score) / _RIVAL_STEP, 50.0))))
-
-    def agreeing(self, rays: CandidateRays) -> float:
-        """Return the share of the dwells that have candidates which agree on the pose."""
-        return _share(rays, self.probability)
-
-    def agreeing_with_rival(self, rays: CandidateRays) -> float:
-        """Return the same for the rival."""
-        return _share(rays, self.rival_probability)
 
 
 def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24) -> PoseAgreement | None:
@@ -176,6 +170,8 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
         probability=probability,
         rival_probability=rival_probability,
         off_sigma=off_sigma,
+        share=_share(rays, probability),
+        rival_share=_share(rays, rival_probability),
         trials=rough.tried,
     )
 
@@ -567,37 +563,6 @@ def _true_positions(rays: CandidateRays, poses: RoughPoses) -> tuple[np.ndarray,
         range_m = np.maximum(rays.polar[None, :, 0], 1e-3)
         points = points * np.sqrt(np.maximum(1.0 - (height_m / range_m) ** 2, _LEAST_SHARE_SQUARED))[..., None]
     return points, np.broadcast_to(by_scale, (len(poses), *by_scale.shape))
-
-
-_DEALS = 16
-_SHIFTS = (1, -1, 2, -2)
-_REFINED = 8
-
-_SIGMAS = 4.0
-"""Standard deviations above the mean that chance reaches in about one of 10,000 recordings."""
-
-
-def chance_scores(rays: CandidateRays, prior: MountingPrior, *, seed: int = 0) -> Values:
-    """Return the scores (d,) of the best poses for wrong deals of the radar's positions; at least three dwells are needed."""
-    n = len(rays)
-    rng = np.random.default_rng(seed)
-    deals = [_deal(rng, n) for _ in range(_DEALS)]
-    deals += [np.roll(np.arange(n), shift) for shift in _SHIFTS if shift % n]
-    found = (pose_agreement(rays.with_radar_of(rows), prior, most=_REFINED) for rows in deals)
-    return np.array([0.0 if one is None else one.score for one in found])
-
-
-def chance_score(scores: Values) -> float:
-    """Return the score that chance hardly exceeds: beyond all deals, and beyond their spread."""
-    return float(max(scores.max(), scores.mean() + _SIGMAS * scores.std()))
-
-
-def _deal(rng: np.random.Generator, n: int) -> Indices:
-    """Draw a permutation that leaves nothing in its place."""
-    while True:
-        rows = rng.permutation(n)
-        if (rows != np.arange(n)).all():
-            return np.asarray(rows)
 
 
 _WIDE_ENOUGH_PX = 16.0

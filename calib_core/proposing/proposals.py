@@ -7,7 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Vector2, freeze
 from calib_core.association.placements import Placement
-from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
 from calib_core.interchange.own.documents import ClickDocument, finite_or_none
 from calib_core.interchange.own.proposal_documents import (
@@ -21,9 +20,10 @@ from calib_core.interchange.own.proposal_documents import (
 )
 from calib_core.interchange.syntax.strict_json import builtins_of, json_text
 from calib_core.measurements import TimeNs
-from calib_core.proposing.common_width import CommonWidth
+from calib_core.proposing.chance import Chance
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
+from calib_core.proposing.pose_agreement import PoseAgreement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,20 +59,16 @@ class Proposals:
     Attributes:
         ranked: at most one per placement.
         unproposed: placements without a proposal, each with the reason.
-        camera_from_radar: a rough pose that the proposals agree on; None if there is none.
-        agreement: share of the placements' weight that agrees on it, 0 to 1.
-        rival_agreement: the same for the best pose that differs clearly.
-        trials: how many poses were tried.
-        width: of the reflector, where it was found in the images and not given.
+        agreement: the rough pose that they agree on; None if there is none.
+        chance: how far chance goes.
+        reflectors: probability that what stood there is a reflector and not a person.
     """
 
     ranked: tuple[Proposal, ...]
     unproposed: tuple[tuple[Placement, str], ...] = ()
-    camera_from_radar: RigidTransform | None = None
-    agreement: float = 0.0
-    rival_agreement: float = 0.0
-    trials: int = 0
-    width: CommonWidth | None = None
+    agreement: PoseAgreement | None = None
+    chance: Chance | None = None
+    reflectors: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +131,7 @@ def proposals_json(proposals: Proposals, views: Sequence[DwellView], source: Pro
         confirmed=list(source.confirmed),
         proposals=[_proposal(name, one) for name, one in named_proposals(proposals, views, source.confirmed)],
         unproposed=[UnproposedDocument(_dwell(placement), reason) for placement, reason in proposals.unproposed],
-        camera_from_radar=_mounting(proposals),
+        camera_from_radar=None if proposals.agreement is None else _mounting(proposals.agreement),
     )
     return json_text(encodable(builtins_of(document)))
 
@@ -172,15 +168,13 @@ def _candidate(candidate: ImageCandidate) -> ImageCandidateDocument:
     )
 
 
-def _mounting(proposals: Proposals) -> RoughMountingDocument | None:
-    pose = proposals.camera_from_radar
-    if pose is None:
-        return None
+def _mounting(agreement: PoseAgreement) -> RoughMountingDocument:
+    pose = agreement.camera_from_radar
     rows: Sequence[Sequence[float]] = pose.rotation.tolist()
     one, two, three = ((a, b, c) for a, b, c in rows)
     x_m, y_m, z_m = pose.translation_m.tolist()
     return RoughMountingDocument(
-        (one, two, three), (x_m, y_m, z_m), proposals.agreement, proposals.rival_agreement, proposals.trials
+        (one, two, three), (x_m, y_m, z_m), agreement.share, agreement.rival_share, agreement.trials
     )
 
 

@@ -11,7 +11,7 @@ from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
-from calib_core.proposing.common_width import CommonWidth
+from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
@@ -27,11 +27,6 @@ LEAST_CONFIDENCE = 0.5
 """What is less probably the reflector is not proposed."""
 _WEAK, _UNSURE = 0.8, 0.9
 """A proposal of less confidence comes with a reason, and with one if its apex is not seen."""
-_CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
-"""Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the images
-of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
-_CHANCE_AFTER_CLICK = 5.0
-"""The same once a click says where one dwell lies: fewer poses are left that could agree by chance."""
 _TEMPER = 1.6
 """By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
 _LIKE_A_CLICK = 0.8
@@ -64,7 +59,7 @@ def proposals_of(
     options: CalibrationOptions,
     *,
     confirmed: Sequence[ReflectorClick] = (),
-    width: CommonWidth | None = None,
+    chance: Chance | None = None,
 ) -> Proposals:
     """Rank what the images show for each dwell; what is probably wrong is not proposed.
 
@@ -73,7 +68,7 @@ def proposals_of(
         camera: the intrinsics.
         options: of the calibration; nominal mounting and measured camera position are used.
         confirmed: clicks that a person placed or accepted so far; each covers its dwell.
-        width: at which the views were looked at, if it was found in them.
+        chance: how far it goes, if that is known already.
     """
     if not views:
         return Proposals(())
@@ -82,7 +77,9 @@ def proposals_of(
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
-    judged = _Judged.of(views, rays, agreement, by_clicks, 0.0 if width is None else width.probability)
+    if chance is None and agreement is not None:
+        chance = chance_of(views, camera, options, confirmed=clicks)
+    judged = _Judged.of(views, rays, agreement, by_clicks, chance)
     covered = _clicks_by_dwell(rays, judged, len(clicks))
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
@@ -99,17 +96,7 @@ def proposals_of(
             range_m = np.linalg.norm(marked.position_radar_m)
             unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
-    if agreement is None:
-        return Proposals(tuple(ranked), tuple(unproposed), width=width)
-    return Proposals(
-        tuple(ranked),
-        tuple(unproposed),
-        agreement.camera_from_radar,
-        agreement.agreeing(rays),
-        agreement.agreeing_with_rival(rays),
-        agreement.trials,
-        width,
-    )
+    return Proposals(tuple(ranked), tuple(unproposed), agreement, chance, judged.reflectors)
 
 
 def _clicks_by_dwell(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
@@ -169,19 +156,14 @@ class _Judged:
         rays: CandidateRays,
         agreement: PoseAgreement | None,
         by_clicks: ClicksAgreement | None,
-        by_deals: float,
+        chance: Chance | None,
     ) -> "_Judged":
-        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say.
-
-        It is trusted by its score, or by what wrong deals reach: `by_deals` is the probability that it is no chance.
-        """
+        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
-        if agreement is not None:
-            above = (agreement.score - (_CHANCE_SCORE if by_clicks is None else _CHANCE_AFTER_CLICK)) / _CHANCE_STEP
-            by_score = _logistic(above)
-            trusted = agreement.pose_probability * max(by_score, by_deals)
+        if agreement is not None and chance is not None:
+            trusted = agreement.pose_probability * chance.probability
             if by_clicks is None:
-                reflectors = _logistic(reflector_log_odds(views, agreement, by_shape=by_deals > by_score))
+                reflectors = _logistic(reflector_log_odds(views, agreement, by_shape=chance.wider != 1.0))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:
@@ -229,7 +211,7 @@ class _Judged:
         ranked = np.sort(self.agreement.probability[i])[::-1]
         if len(ranked) > 1 and ranked[1] > 0.5 * ranked[0]:
             return _TWO_PLACES
-        return _UNLIKELY if self.trusted >= _WEAK else self._of_pose()
+        return _UNLIKELY if self.trusted >= _UNSURE else self._of_pose()
 
     def _of_pose(self) -> str:
         certain = self.agreement is not None and self.agreement.pose_probability >= _WEAK

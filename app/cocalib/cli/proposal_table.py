@@ -73,8 +73,8 @@ def _summary(proposals: Proposals, confirmed: Sequence[str]) -> str:
         said = "no proposals"
     if confirmed:
         said += f"; {len(confirmed)} {'click was' if len(confirmed) == 1 else 'clicks were'} given as confirmed"
-    if proposals.camera_from_radar is not None:
-        agreement, rival = (100.0 * share for share in (proposals.agreement, proposals.rival_agreement))
+    if proposals.agreement is not None:
+        agreement, rival = (100.0 * share for share in (proposals.agreement.share, proposals.agreement.rival_share))
         said += f"; images and radar agree on one mounting by {agreement:.0f} %, on another by {rival:.0f} %"
     return said
 

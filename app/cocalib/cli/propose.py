@@ -111,7 +111,7 @@ def _deliver(
         recording=tuple(name_text(path.name) for path in recording.paths),
         image_topic=recording.image_topic,
         radar_topics=recording.radar_topics,
-        reflector_m=reflector_m if proposals.width is None else proposals.width.reflector_m,
+        reflector_m=reflector_m if proposals.chance is None else reflector_m * proposals.chance.wider,
         confirmed=confirmed,
     )
     text = proposals_json(proposals, views, source)

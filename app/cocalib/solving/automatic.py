@@ -74,11 +74,11 @@ def place_clicks(
     )
     if isinstance(found, Unsolvable):
         return found
-    assert camera is not None, "without a camera there are no proposals"
     views, proposals = found
-    if not proposals.ranked and any(click.counts for click in confirmed):
+    counting = [click for click in confirmed if click.counts]
+    if not proposals.ranked and counting:
         return PlacedClicks(tuple(confirmed), None)
-    placed = automatic_clicks(proposals, views, camera, options)
+    placed = automatic_clicks(proposals, len(views), confirmed=counting)
     if isinstance(placed, Unsolvable):
         return placed
     clicks = _with_own_ids(placed.clicks, confirmed)
