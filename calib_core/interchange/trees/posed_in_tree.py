@@ -113,7 +113,7 @@ def calibration_in_tree(
     ends = [name for name in (stated.camera, stated.camera_link) if name in tree.frames] if stated is not None else []
     if stated is not None and ends and stated.radar in tree.frames:
         known = Sensor(stated.camera, "camera", "optical"), Sensor(stated.camera_link, "camera", "link")
-        tree = replace(tree, sensors=(*known, *tree.sensors))
+        tree = replace(tree, sensors=(*tree.sensors, *known))
         wanted = WantedFrames(wanted.radar or stated.radar, wanted.camera or ends[0])
     chosen = choose_frames(tree, wanted, source=source)
     is_stated = stated is not None and (chosen.radar, chosen.camera) == (stated.radar, *ends[:1])

@@ -11,7 +11,13 @@ from calib_core.interchange.trees.driveworks import read_driveworks, recognizes_
 from calib_core.interchange.trees.easy_handeye import read_easy_handeye, recognizes_easy_handeye
 from calib_core.interchange.trees.foxglove import read_foxglove, recognizes_foxglove
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor, TreePart, joined
-from calib_core.interchange.trees.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
+from calib_core.interchange.trees.nuscenes import (
+    read_nuscenes,
+    read_nuscenes_alone,
+    recognizes_nuscenes,
+    recognizes_poses,
+    recognizes_sensors,
+)
 from calib_core.interchange.trees.openlabel import read_openlabel, recognizes_openlabel
 from calib_core.interchange.trees.pjlab import read_extrinsics, recognizes_extrinsics
 from calib_core.interchange.trees.publishers import read_publishers, recognizes_publishers
@@ -53,6 +59,7 @@ JOINTS: tuple[tuple[Callable[[Content], bool], Callable[[Content, str], TreePart
     (recognizes_tf_echo, read_tf_echo),
     (recognizes_openlabel, read_openlabel),
     (recognizes_foxglove, read_foxglove),
+    (recognizes_nuscenes, read_nuscenes_alone),
 )
 """How each format with joints is recognized and read."""
 
@@ -66,8 +73,6 @@ def tree_in(content: Content, source: str) -> TreePart | None:
     for recognizes, read in JOINTS:
         if recognizes(content):
             return read(content, source)
-    if recognizes_poses(content) and len(content.value) > 2:
-        return next(_posed_by_tables([(content, source)], {}))
     return None
 
 
@@ -129,10 +134,6 @@ def _posed_by_tables(poses: list[tuple[Content, str]], tables: Mapping[str, Cont
     for content, source in poses:
         beside = tables.get(str(Path(source).parent))
         table = beside or (next(iter(tables.values())) if len(tables) == 1 else None)
-        if table is None and len(content.value) > 2:
-            raise InputError(
-                f"{source}: does not name its {len(content.value)} sensors; give sensor.json of the same folder as well"
-            )
         yield read_nuscenes(content, source, table)
 
 

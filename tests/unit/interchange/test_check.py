@@ -197,7 +197,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("Größe: 1".encode("latin-1"), "save it as UTF-8"),
         ("hello: world", "no pose of a camera and a radar in it .*found hello"),
         ("{}", "no pose of a camera and a radar in it"),
-        ("[]", "0 records with camera_intrinsic"),
+        ("[]", "no pose of a camera and a radar"),
         (b"\xff\xfe\x00", "not a text file in UTF-8; give a calibration"),
         (b"PK\x03\x04broken", "a damaged zip archive"),
         (b"MATLAB 5.0 MAT-file", "not a mat file of level 5; save it with -v7 or -v6"),

@@ -343,6 +343,25 @@ def test_nuscenes_says_which_of_two_unnamed_sensors_is_taken_for_the_radar():
     np.testing.assert_array_equal(by_names.pose.rotation, found.pose.rotation)
 
 
+def test_the_order_of_nuscenes_rotations_is_told_by_what_stands_upright():
+    level, forward = [0.999, 0.01, -0.02, 0.04], [0.51, -0.49, 0.5, -0.5]  # of a radar and of a camera, w x y z
+    level, forward = (list(np.array(one) / np.linalg.norm(one)) for one in (level, forward))
+    intrinsic = {"camera_intrinsic": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+
+    def found(camera: list[float], *radar: list[float]):
+        records = [{"translation": [0, 0, 1], "rotation": camera, **intrinsic}]
+        return read_any(json.dumps(records + [{"translation": [3, 0, 0.5], "rotation": one} for one in radar]))
+
+    right = found(forward, level)
+    assert not any("x y z w" in one for one in right.assumptions)
+    last = found([*forward[1:], forward[0]], [*level[1:], level[0]])
+    assert any("in the order x y z w" in one for one in last.assumptions)
+    np.testing.assert_allclose(last.camera_from_radar.as_matrix(), right.camera_from_radar.as_matrix(), atol=1e-9)
+    alone = found(forward)
+    assert any("check which order" in one for one in alone.assumptions)
+    np.testing.assert_allclose(alone.pose.rotation, forward)
+
+
 # COLMAP's camera models: each becomes the right lens, and no coefficient is lost.
 
 

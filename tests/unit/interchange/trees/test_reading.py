@@ -154,7 +154,7 @@ def test_the_whole_table_of_nuscenes_is_read_by_its_sensors_names(tmp_path):
     two = vehicles.write_nuscenes(tmp_path / "two", two_vehicles=True)
     assert "4 camera frames: CAM_FRONT@000000a0" in refusal([two])
     assert read_any_files([two], WantedFrames(camera="CAM_FRONT@000000b0")).frames.camera == "CAM_FRONT@000000b0"
-    assert "8 sensors; give sensor.json" in refusal([two / "calibrated_sensor.json"])
+    assert "does not name its 8 sensors" in refusal([two / "calibrated_sensor.json"])
 
 
 def test_a_rig_of_many_sensors_is_chained_with_body_axes():
