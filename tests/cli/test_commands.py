@@ -96,6 +96,11 @@ def test_info_names_the_topics_as_text_and_as_json(cocalib, made):
     assert {topic["name"] for topic in json.loads(data.out)["topics"]} == names
 
 
+def test_info_counts_the_placements(cocalib, sample):
+    last = cocalib("info", sample / "radar.bag", sample / "camera.bag").out.splitlines()[-1]
+    assert last.startswith("placements  20 ")
+
+
 def test_info_writes_each_warning_with_its_code_message_and_hint(cocalib, made):
     recording = made("cut")
     recording.write_bytes(recording.read_bytes()[:-9])

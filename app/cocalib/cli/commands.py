@@ -62,7 +62,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "info",
             "cocalib.cli.info:Info",
-            "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings.",
+            "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, placements, warnings.",
             (
                 "radar.bag camera.bag",
                 "drive.mcap --verify",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Info:
-    """Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings."""
+    """Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, placements, warnings."""
 
     recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of images, radar CSV, videos; several are read as one recording."""
@@ -46,7 +46,9 @@ class Info:
                 summary = encodable(msgspec.to_builtins(recording_summary(recording)))
                 print(msgspec.json.format(msgspec.json.encode(summary), indent=2).decode())
             else:
-                print(describe(recording))
+                print(describe(recording), flush=True)
+                if recording.radar_topics:
+                    print(f"\nplacements  {_placements(recording)}")
         return 0
 
     def _write(self, recording: "Recording") -> None:
@@ -82,3 +84,20 @@ class Info:
             else verification_text(found)
         )
         return 0 if found.sound else 1
+
+
+def _placements(recording: "Recording") -> str:
+    """Say how many placements the radar shows, and what the recording is good for."""
+    import numpy as np
+
+    from calib_core.errors import CalibrationError
+    from calib_core.options import GatingOptions
+    from cocalib.web.channel.radar_survey import survey_of
+
+    moments = recording.image_times
+    try:
+        if not len(moments):
+            moments = np.concatenate([window.times_ns for window in recording.radar_windows()])
+        return survey_of(recording.radar_windows(), moments, GatingOptions()).message.summary
+    except CalibrationError as error:
+        return f"unknown: {error}"

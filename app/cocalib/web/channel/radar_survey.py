@@ -31,6 +31,8 @@ SHORTEST_S = 2.0
 """A placement lasts at least this long [s]."""
 _SHORT_S = 3.0
 """A click averages the returns of this time [s]; a shorter placement has fewer."""
+_WITHOUT = "it can show a calibration, and judge it"
+"""What a recording without placements is good for."""
 _LITTLE_DB = 6.0
 """A reflector that stands out less may be taken for clutter."""
 
@@ -330,14 +332,11 @@ def placement_summary(rows: Sequence[PlacementRow], length_s: float) -> str:
         length_s: of the recording [s].
     """
     if length_s < SHORTEST_S:
-        return (
-            f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer: it can show a "
-            "calibration, and judge it"
-        )
+        return f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer: {_WITHOUT}"
     if not rows:
         return (
             f"No placement found: nothing appeared, stood still for {SHORTEST_S:.0f} s or longer, and went away again. If a "
-            "reflector stood all the time, open the recordings of all placements together"
+            f"reflector stood all the time, open the recordings of all placements together; else {_WITHOUT}"
         )
     ranges = [row.range_m for row in rows]
     words = [
