@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Points3, Values, Vector2, Vector3, frozen_array
-from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.placement_groups import PlacementGroup, click_sigmas, placement_groups, steps_of_sigma
 from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
@@ -18,7 +17,7 @@ from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
 from calib_core.measurements import Candidate, DataWarning, Pair
 from calib_core.options import CalibrationOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines, sigma_polar_of
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, sigma_polar_of
 from calib_core.results import Calibration, Metrics, PairResult
 from calib_core.results.calibration import CHI2_999_2
 from calib_core.results.metrics import distances, metrics_of
@@ -67,22 +66,6 @@ def used_pair_results(
         for i, pair in enumerate(used)
         for chosen in (int(refined.rows[i] - measurements.first[i]),)
     }
-
-
-def changed_returns(before: Sequence[PairResult], after: Sequence[PairResult]) -> frozenset[str]:
-    """Return the ids of the pairs that have another return than before, although nobody chose it or moved the click."""
-    earlier = {result.id: result for result in before}
-    return frozenset(
-        result.id for result in after if result.id in earlier and _has_another_return(earlier[result.id], result)
-    )
-
-
-def _has_another_return(before: PairResult, after: PairResult) -> bool:
-    if before.measured is None or after.measured is None or (before.pixel_px != after.pixel_px).any():
-        return False
-    same_question = before.measured.chosen == after.measured.chosen and before.image_time == after.image_time
-    steps = direction_cosines(np.array([before.point_radar_m, after.point_radar_m])) / CLUSTER_SCALE
-    return same_question and float(np.linalg.norm(steps[1] - steps[0])) > _ELSEWHERE
 
 
 def residual_covariances(model: Linearization) -> np.ndarray:
@@ -234,7 +217,6 @@ def _return_of(group: PlacementGroup, results: Mapping[str, PairResult]) -> Vect
 
 
 _BY_CHANCE = 2.0  # standard deviations
-_ELSEWHERE = 3.0  # steps between two returns that are not parts of one
 _NONE_OF_THEM = 0.1
 """Probability, before the click is compared, that none of the candidates is the reflector."""
 

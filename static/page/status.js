@@ -76,8 +76,7 @@ function drawStatus() {
 function doingWords(view) {
   if (!state.connected) return "Not connected";
   if (view.solving) return view.checking ? "Checking…" : "Solving…";
-  if (view.reference && !view.has_calibration) return view.status;
-  return [searchWords() || "Connected", view.status].filter(Boolean).join("  ·  ");
+  return view.status || searchWords() || "Connected";
 }
 
 /** How a recording that is still being written goes on, and where the next placement pays. @returns {string[]} */

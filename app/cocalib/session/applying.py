@@ -6,10 +6,8 @@ from functools import singledispatch
 from typing import TypeAlias
 
 from calib_core.errors import CalibrationError
-from calib_core.estimation.pair_results import changed_returns
 from calib_core.interchange.own.clicks_json import click_of
 from calib_core.measurements import Mark, ReflectorClick, TimeNs, time_parts
-from calib_core.results import Calibration
 from cocalib.option_changes import changed_options, changes_from_tree
 from cocalib.session.click_stamps import nearest_frame
 from cocalib.session.events import (
@@ -50,7 +48,7 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     if isinstance(event, Solved):
         if event.revision != session.revision:
             return session
-        return _with_answer(event, session)
+        return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
     if isinstance(event, AxesStated):
         return session
     if isinstance(event, ScansAdded):
@@ -63,21 +61,6 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     unchanged = {click.id for click in changed.clicks if click in session.clicks}
     reviewed = tuple(one for one in changed.reviewed if one in unchanged)
     return replace(changed, reviewed=reviewed, revision=session.revision + 1)
-
-
-def _with_answer(event: Solved, session: Session) -> Session:
-    """Return the session with an answer; what its preview changed already counts as changed by it."""
-    before, after = (one.pairs if isinstance(one, Calibration) else () for one in (session.outcome, event.outcome))
-    changed = changed_returns(before, after)
-    if session.outcome_revision == event.revision:
-        changed ^= session.changed_returns
-    return replace(
-        session,
-        outcome=event.outcome,
-        outcome_revision=event.revision,
-        changed_returns=changed,
-        checked=event.checked,
-    )
 
 
 def _keep_answer(event: _Aside, session: Session) -> Session:

@@ -163,7 +163,6 @@ class Session:
         revision: increases by one with every change of clicks or options, including undo and redo.
         outcome: the latest answer; it stays while a newer one is being computed.
         outcome_revision: the revision that `outcome` answers; -1 before the first.
-        changed_returns: ids of the clicks whose return that answer changed.
         checked: while there is no calibration, the clicks evaluated under the one given for review.
         column_map: the values of --map that the recording is read with; remembered for the next opening.
         confirmed: texts of the assumptions about the recording that the user has confirmed.
@@ -179,7 +178,6 @@ class Session:
     revision: int = 0
     outcome: Outcome | None = None
     outcome_revision: int = -1
-    changed_returns: frozenset[str] = frozenset()
     checked: tuple[PairResult, ...] = ()
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()

@@ -42,7 +42,6 @@ from cocalib.session.state import Outcome, RecordingFacts, Session
 from cocalib.view.click_rows import click_rows, disagreement
 from cocalib.view.figures import (
     assumed_figures,
-    firm_text,
     metric_figures,
     pose_figures,
     refined_sentences,
@@ -93,7 +92,7 @@ def view(
     return View(
         revision=session.revision,
         stage=stage,
-        status=_status(session, facts, reference),
+        status=reference_words(session, reference) if reference and calibration is None else "",
         solving=session.needs_solving,
         checking=session.is_checking,
         solved_revision=session.outcome_revision if outcome is not None else -1,
@@ -154,22 +153,6 @@ def _waits_for_clicks(session: Session) -> bool:
     """Return whether more placements are all that is missing, according to the latest outcome."""
     blocked = isinstance(session.outcome, Unsolvable) and session.outcome.code != "too-few-pairs"
     return _missing(session) > 0 and not blocked
-
-
-def _status(session: Session, facts: RecordingFacts, reference: Reference | None) -> str:
-    """Return what the status line adds to what is going on."""
-    found = session.outcome
-    if not isinstance(found, Calibration):
-        return "" if reference is None else reference_words(session, reference)
-    asked = sum(pair.rival >= 0 and not pair.inlier and not pair.excluded for pair in found.pairs)
-    changed = len({click.id for click in session.clicks} & session.changed_returns)
-    told = (
-        f"{asked} pair{' needs' if asked == 1 else 's need'} a return (C)" if asked else "",
-        "" if found.sees_elevation else firm_text(found),
-        "1 click changed its return" if changed == 1 else f"{changed} clicks changed their return" if changed else "",
-        "unconfirmed assumptions" if facts.unconfirmed(session) else "",
-    )
-    return "  ·  ".join(filter(None, told))
 
 
 def _warnings(calibration: Calibration | None, verdict: Verdict) -> tuple[WarningRow, ...]:

@@ -79,12 +79,6 @@ def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
     )
 
 
-def firm_text(calibration: Calibration) -> str:
-    """Return what a radar without elevation determines, in one line."""
-    figures = [figure for figure in pose_figures(calibration) if figure.key in (*_FIRM, "image")]
-    return ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in figures)
-
-
 def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
     mounting = mounting_of(calibration)
     position_sigma_m, angle_sigma_rad = mounting.position_sigma_m.copy(), mounting.roll_pitch_yaw_sigma_rad.copy()

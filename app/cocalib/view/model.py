@@ -249,7 +249,7 @@ class View:
     Attributes:
         revision: of the session; grows with every change.
         stage: how far the session has come.
-        status: what the status line says besides: "2 pairs need a return (C)"; or of the calibration under review.
+        status: what the status line says of the calibration under review; "" otherwise.
         solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
         checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
         solved_revision: the revision that the figures belong to; -1 without figures.

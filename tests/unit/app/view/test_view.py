@@ -127,20 +127,6 @@ def test_a_return_that_the_camera_does_not_see_is_not_offered_unless_it_is_in_us
         assert [row.position_m for row in click_candidates(session, outcome.pairs[4].measured).rows] == offered_m
 
 
-def test_clicks_that_changed_their_return_are_told_until_the_next_answer():
-    before, after = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
-    history = advance(clicked(5), Solved(5, before), FACTS)
-    assert "changed" not in view(history, FACTS).status
-    preview = Solved(6, replace(after, checking=True))
-    history = advance(advance(history, ClickMoved("c1", (11.0, 20.0)), FACTS), preview, FACTS)
-    assert view(history, FACTS).status.startswith("1 click changed")
-    assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status, "it was taken back"
-    history = advance(history, Solved(6, after), FACTS)
-    assert view(history, FACTS).status.startswith("1 click changed")
-    again = advance(history, ClickMoved("c1", (12.0, 20.0)), FACTS)
-    assert "changed" not in view(advance(again, Solved(7, after), FACTS), FACTS).status
-
-
 UNSEEN = Unsolvable.reported(
     "too-few-pairs",
     "3 of at least 4 pairs",
