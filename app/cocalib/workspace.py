@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -14,8 +14,7 @@ from calib_core.input_files import name_text
 from calib_core.interchange.cameras.files import CameraFile
 from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
-from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
-from calib_core.options import CalibrationOptions
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
 from cocalib.hypothesis_sheet import OpenMeaning
@@ -57,26 +56,6 @@ class NullJournal:
         return Closed(self._folder, clicks=0)
 
 
-class Solver(Protocol):
-    """Solves revisions: cocalib.solving.worker.SolverWorker, or a fake in a test."""
-
-    def request(
-        self,
-        revision: int,
-        clicks: Sequence[ReflectorClick],
-        options: CalibrationOptions,
-        when_done: Callable[[Solved], None],
-        camera: Camera | None = None,
-    ) -> None:
-        """Solve this revision and drop older requests; must not block. A larger revision is a newer one.
-
-        Without a camera, it is solved with the intrinsics that the recording was opened with.
-        """
-
-    def close(self) -> None:
-        """Stop: no answer comes after this returns."""
-
-
 @dataclass(frozen=True, slots=True)
 class GivenIntrinsics:
     """The intrinsics that a recording was opened with.
@@ -113,7 +92,7 @@ class Workspace:
         facts: RecordingFacts,
         restored: Restored,
         journal: Journal,
-        solver: Solver,
+        solver: SolverWorker,
         reference: Reference | None = None,
         given: GivenIntrinsics | None = None,
     ) -> None:

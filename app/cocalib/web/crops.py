@@ -1,17 +1,15 @@
 """Cut-outs of marks for the contact sheet: made one after the other, and kept in a file in the session's folder.
 
-The file may be cut short or removed: what is missing is made again.
+The file may be damaged or removed: what is missing is made again.
 """
 
 import contextlib
-import os
-import struct
 import zlib
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeAlias
 
+import msgspec
 import numpy as np
 
 from calib_core.recordings import Recording
@@ -22,8 +20,8 @@ from cocalib.web.frames import CROP_PX, crop
 CropKey: TypeAlias = tuple[int, float, float, int]
 """Stamp of the image [ns], column and row of the middle, and side of the square in the image [px]."""
 FILE = "crops"
-_MOST_BYTES = 30_000_000
-_RECORD = struct.Struct("<IIQddH")  # checksum of what follows, length of the JPEG, key
+_MOST_BYTES, _KEY_BYTES = 30_000_000, 64
+"""Of the file, and at most of a key in it."""
 
 
 class Crops:
@@ -33,8 +31,8 @@ class Crops:
         self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="crops")
         self._recording, self._folder, self._most_bytes = recording, folder, most_bytes
         self._kept: dict[CropKey, bytes] = {}
-        self._size = 0
         self._marks: list[CropKey] = []
+        self._has_new = False
         self.thread.submit(self._read)
 
     def keep_marks(self, view: View) -> None:
@@ -45,6 +43,7 @@ class Crops:
     def end(self) -> None:
         """Read nothing more of the recording."""
         self.thread.shutdown(cancel_futures=True)
+        self._write()
 
     def get(self, key: CropKey) -> bytes:
         """Return a cut-out as JPEG, made if it is not kept.
@@ -59,7 +58,8 @@ class Crops:
             index = int(np.searchsorted(times, stamp))
             if not 0 <= index < len(times) or times[index] != stamp:
                 raise KeyError(stamp)
-            self._keep(key, crop(self._recording.image_bytes(index).data, u_px, v_px, side_px))
+            self._kept[key] = crop(self._recording.image_bytes(index).data, u_px, v_px, side_px)
+            self._has_new = True
         return self._kept[key]
 
     def _make_next(self) -> None:
@@ -69,54 +69,25 @@ class Crops:
                 self.thread.submit(self._make_next)
                 self.get(key)
                 return
-
-    def _keep(self, key: CropKey, made: bytes) -> None:
-        self._kept[key] = made
-        self._size += _RECORD.size + len(made)
-        if self._size > self._most_bytes:
-            self._replace(dict(list(self._kept.items())[len(self._kept) // 2 :]))  # the older half makes room
-            return
-        self._on_disk(lambda folder: _append(folder, _record(key, made)))
+        self._write()
 
     def _read(self) -> None:
-        def read(folder: GuardedFolder) -> None:
-            data = folder.read(FILE) or b""
-            self._kept = dict(_records(data[: self._most_bytes]))
-            self._size = sum(_RECORD.size + len(made) for made in self._kept.values())
-            if self._size < len(data):  # a damaged end
-                self._replace(self._kept)
+        with contextlib.suppress(OSError, SessionFileError, msgspec.MsgspecError):
+            with contextlib.closing(GuardedFolder(self._folder)) as folder:
+                data = folder.read(FILE) or b""
+            if zlib.crc32(data[4:]) == int.from_bytes(data[:4]):
+                self._kept = msgspec.msgpack.decode(data[4:], type=dict[CropKey, bytes])
 
-        self._on_disk(read)
-
-    def _replace(self, kept: dict[CropKey, bytes]) -> None:
-        whole = b"".join(_record(*item) for item in kept.items())
-        self._kept, self._size = kept, len(whole)
-        self._on_disk(lambda folder: folder.replace(FILE, whole))
-
-    def _on_disk(self, work: Callable[[GuardedFolder], None]) -> None:
-        """Do what can be done in the session's folder; without it, cut-outs last as long as the program."""
-        with contextlib.suppress(OSError, SessionFileError), contextlib.closing(GuardedFolder(self._folder)) as folder:
-            work(folder)
-
-
-def _append(folder: GuardedFolder, record: bytes) -> None:
-    with os.fdopen(folder.open(FILE, os.O_WRONLY | os.O_APPEND | os.O_CREAT), "ab") as file:
-        file.write(record)
-
-
-def _record(key: CropKey, made: bytes) -> bytes:
-    rest = _RECORD.pack(0, len(made), *key)[4:] + made
-    return zlib.crc32(rest).to_bytes(4, "little") + rest
-
-
-def _records(data: bytes) -> Iterator[tuple[CropKey, bytes]]:
-    """Yield the cut-outs of a file, up to what is damaged."""
-    at = 0
-    while at + _RECORD.size <= len(data):
-        checksum, length, *key = _RECORD.unpack_from(data, at)
-        end = at + _RECORD.size + length
-        if end > len(data) or zlib.crc32(data[at + 4 : end]) != checksum:
+    def _write(self) -> None:
+        """Write what is kept, the newest first up to the limit; without a folder it lasts as long as the program."""
+        if not self._has_new:
             return
-        stamp, u_px, v_px, side_px = key
-        yield (stamp, u_px, v_px, side_px), data[at + _RECORD.size : end]
-        at = end
+        self._has_new = False
+        room = self._most_bytes
+        for key, made in reversed(self._kept.copy().items()):
+            room -= len(made) + _KEY_BYTES
+            if room < 0:
+                del self._kept[key]
+        packed = msgspec.msgpack.encode(self._kept)
+        with contextlib.suppress(OSError, SessionFileError), contextlib.closing(GuardedFolder(self._folder)) as folder:
+            folder.replace(FILE, zlib.crc32(packed).to_bytes(4) + packed)

@@ -13,7 +13,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -33,10 +32,8 @@ from cocalib.session.state import Session
 from cocalib.solving.solving import calibration_text
 from cocalib.view.wording import sentence
 from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
-from cocalib.web.channel.image_changes import ImageChanges
-from cocalib.web.channel.lens import LensService
+from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
-from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.crops import Crops
 from cocalib.web.exports import FieldError, format_rows, image_of
 from cocalib.web.port.viser_hook import client_page
@@ -80,25 +77,6 @@ _INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 _IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["'](\.\.?/[a-z0-9_./]+\.js)["']""", re.MULTILINE)
 _SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_/]+\.js)">')
-
-
-class Surveyor(Protocol):
-    """Provides the radar survey once it is complete, how much the images change, and the lens, as far as they are known."""
-
-    @property
-    def survey(self) -> Survey | None:
-        """The radar's survey of the recording."""
-        ...
-
-    @property
-    def image_changes(self) -> ImageChanges:
-        """How much the images change."""
-        ...
-
-    @property
-    def lens(self) -> LensService:
-        """The lens of whoever calibrates one."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +145,7 @@ class Routes:
         self._downloads: _Downloads | None = None
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
-    def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
+    def admit(self, workspace: Workspace, recording: Recording, hub: Hub) -> None:
         """Serve this recording from now on."""
         self._downloads = _Downloads(workspace, recording, hub)
         self._made = self._downloads.by_path()
@@ -199,7 +177,7 @@ class Routes:
 class _Downloads:
     """Responses generated from the session of a recording."""
 
-    def __init__(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
+    def __init__(self, workspace: Workspace, recording: Recording, hub: Hub) -> None:
         self._workspace = workspace
         self._recording = recording
         self._hub = hub

@@ -38,6 +38,7 @@ def made(recording: Counted, folder: Path, *keys: CropKey, most_bytes: int = 30_
     crops: Any = Crops(recording, folder, most_bytes=most_bytes)
     waiting = [crops.thread.submit(crops.get, key) for key in keys]
     crops.thread.shutdown()
+    crops.end()
     return [answer.result() for answer in waiting]
 
 
@@ -76,7 +77,7 @@ def test_a_damaged_file_costs_nothing_but_time(recording, tmp_path, damage):
         changed = whole[:-9] + b"?" + whole[-8:]
         file.write_bytes({"cut": whole[:-40], "changed": changed, "text": b"not a cache\n" * 99}[damage])
     assert made(recording, tmp_path, *keys) == first
-    assert recording.reads == {"cut": 3, "changed": 3, "text": 4, "link": 4}[damage]
+    assert recording.reads == 4
     if damage == "link":
         assert (tmp_path / "elsewhere").read_bytes() == whole
     else:
