@@ -14,7 +14,7 @@ const [SHARE, LEAST, MOST] = [0.24, 96, 240];
 const MUCH = 0.5;
 const canvas = make("canvas", "", []);
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-const isSwapped = () => document.body.classList.contains("space-large");
+const isSwapped = () => document.body.classList.contains("space-large") && document.documentElement.dataset.shape === "wide";
 
 export function startInset() {
   canvas.id = "inset";

@@ -88,11 +88,13 @@ function drawAdvice(pen, advice) {
   pen.lineWidth = 3 * viewport.unit;
   pen.strokeStyle = ink.edge;
   const words = "best next placement";
+  const half = pen.measureText(words).width / 2 + 4 * viewport.unit;
+  const middle = Math.max(half, Math.min(pen.canvas.width - half, x));
   const low = y + high + 13 * viewport.unit;
   const at = low < pen.canvas.height - PILL * viewport.unit ? low : y - high - 4 * viewport.unit;
-  pen.strokeText(words, x, at);
+  pen.strokeText(words, middle, at);
   pen.fillStyle = ink.guess;
-  pen.fillText(words, x, at);
+  pen.fillText(words, middle, at);
 }
 
 /** A click of another frame, small and dimmed. @param {Context2D} pen @param {Click} click */

@@ -107,7 +107,8 @@ export class Plot {
     pen.lineWidth = 1;
     pen.textBaseline = "alphabetic";
     for (const [axis, upright] of /** @type {[Axis, boolean][]} */ ([[content.x, false], [content.y, true]])) {
-      for (const value of ticks(axis, Math.max(2, Math.floor((upright ? floor - EDGE.top : right - EDGE.left) / (upright ? 20 : 32))))) {
+      const most = Math.max(2, Math.floor((upright ? floor - EDGE.top : right - EDGE.left) / (upright ? 20 : 32)));
+      for (const value of ticks(axis, content.bar && !upright ? Math.min(most, axis.high) : most)) {
         const [x, y] = this.place(upright ? content.x.low : value, upright ? value : content.y.low);
         pen.strokeStyle = this.colour.line;
         pen.beginPath();

@@ -113,8 +113,8 @@ function rowsOf(placements) {
 function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
   const here = state.seconds[state.cursor];
-  const left = axis.toX(placement.start_s);
-  const wide = Math.max(5, axis.toX(placement.end_s) - left);
+  const left = axis.toX(Math.max(placement.start_s, state.seconds[0]));
+  const wide = Math.max(5, axis.toX(Math.min(placement.end_s, state.seconds[state.seconds.length - 1])) - left);
   const [middle, height] = [left + wide / 2, bottom - top];
   const fate = stateOf(placement);
   const current = placement.start_s <= here && here <= placement.end_s;
