@@ -142,7 +142,7 @@ def test_export_without_out_prints_and_into_a_folder_names_itself(cocalib, solve
 
 def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(cocalib, tmp_path):
     files = {file.name: file for file in (*TOOLS, *DATA_SETS)}
-    for name in ("koide3", "Scale frame", "Segments.ai", "KITTI odometry", "KITTI raw"):
+    for name in ("koide3", "KITTI odometry", "KITTI raw"):
         folder, file = tmp_path / name, files[name]
         folder.mkdir()
         for path, content in {**file.beside, file.file_name: file.content}.items():

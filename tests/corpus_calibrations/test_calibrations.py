@@ -43,7 +43,7 @@ def test_a_file_is_read_right_or_refused_with_what_to_do(readings, name):
 
 
 def test_a_sensor_that_the_file_does_not_call_a_radar_is_an_assumption(readings):
-    for name in ("koide3", "KITTI raw", "KITTI odometry", "Scale frame", "Segments.ai", "Autoware.AI", "OpenLABEL"):
+    for name in ("koide3", "KITTI raw", "KITTI odometry", "Segments.ai, OpenCV", "Autoware.AI", "OpenLABEL"):
         assert readings[name].assumed, name
     for name in ("tf2_echo without names", "TUM pose", "PJLab", "DriveWorks rig, corrected"):
         assert readings[name].assumed, name

@@ -147,39 +147,6 @@ def _openlabel_in_a_vehicle() -> str:
     )
 
 
-def _scale_pose(matrix: np.ndarray, prefix: str = "") -> dict[str, Any]:
-    x, y, z, w = quaternion(matrix)
-    return {
-        f"{prefix}position": dict(zip("xyz", matrix[:3, 3].tolist(), strict=True)),
-        f"{prefix}heading": {"w": w, "x": x, "y": y, "z": z},
-    }
-
-
-def _scale_frame() -> str:
-    image = {
-        "image_url": "https://example.com/1.jpg",
-        "camera_index": 0,
-        "camera_model": "brown_conrady",
-        **{"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2], "skew": 0},
-        **{"k1": K1, "k2": K2, "p1": P1, "p2": P2, "k3": K3},
-        **_scale_pose(WORLD_FROM_DEVICE @ RADAR_FROM_CAMERA),
-    }
-    return json.dumps(
-        {
-            "points": [],
-            "radar_points": [{"position": {"x": 1, "y": 2, "z": 3}, "direction": {"x": 0, "y": 0, "z": 0}, "size": 1}],
-            "images": [image],
-            "timestamp": 1541196976735462000,
-            **_scale_pose(WORLD_FROM_DEVICE, "device_"),
-        }
-    )
-
-
-def _scale_extrinsics() -> str:
-    x, y, z, w = quaternion(RADAR_FROM_CAMERA)
-    return json.dumps({"heading": [w, x, y, z], "position": RADAR_FROM_CAMERA[:3, 3].tolist()})
-
-
 def _segments(pose: np.ndarray, **convention: str) -> str:
     image = {
         "name": "front",
@@ -264,15 +231,8 @@ TOOLS = (
     Calibration(
         "OpenLABEL inverted", "openlabel.json", _openlabel_by_matrix(inverse(RADAR_FROM_CAMERA)), refused="inverted"
     ),
-    Calibration("Scale frame", "frame.json", _scale_frame(), holds_camera="lens"),
-    Calibration("Scale extrinsics", "extrinsics.json", _scale_extrinsics()),
-    Calibration(
-        "Segments.ai, OpenCV",
-        "sample.json",
-        _segments(RADAR_FROM_CAMERA, camera_convention="OpenCV"),
-        holds_camera="lens",
-    ),
-    Calibration("Segments.ai", "sample.json", _segments(RADAR_FROM_CAMERA @ OPENGL), holds_camera="lens"),
+    Calibration("Segments.ai, OpenCV", "sample.json", _segments(RADAR_FROM_CAMERA, camera_convention="OpenCV")),
+    Calibration("Segments.ai", "sample.json", _segments(RADAR_FROM_CAMERA @ OPENGL), refused="opengl"),
     Calibration("TUM pose", "pose.txt", f"1305031098.6659 {words(POSE_7)}\n"),
     Calibration("TUM trajectory", "trajectory.txt", f"1.0 {words(POSE_7)}\n2.0 {words(POSE_7)}\n", refused="2 poses"),
     Calibration("4x4 in text", "radar_to_camera.txt", "\n".join(words(row) for row in CAMERA_FROM_RADAR)),

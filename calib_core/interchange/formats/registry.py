@@ -21,7 +21,6 @@ from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
 from calib_core.interchange.formats.koide3 import KOIDE3
-from calib_core.interchange.formats.labelling import SCALE, SEGMENTS
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RADAR_OFFSET, KALIBR_CHAIN, KITTI_CAMERAS
@@ -70,7 +69,7 @@ _TRIED_FIRST = (
 )
 # Formats that are only read; each is recognized by keys or lines that no other tool writes.
 _ONLY_READ = (
-    *(SCALE, SEGMENTS, AUTOWARE_AI, KITTI_RAW, KITTI_ODOMETRY, KOIDE3),
+    *(AUTOWARE_AI, KITTI_RAW, KITTI_ODOMETRY, KOIDE3),
     Reads(lambda content: any(recognizes(content) for recognizes, _ in JOINTS), read_joints),
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )

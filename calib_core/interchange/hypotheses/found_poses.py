@@ -38,6 +38,7 @@ _OF_AXES = {
     "optical": ("camera", "optical"),
     "link": ("camera", "body"),
     "body": ("camera", "body"),
+    "opencv": ("camera", "optical"),
     "opengl": ("camera", "opengl"),
     "blender": ("camera", "opengl"),
     "flu": ("radar", "flu"),

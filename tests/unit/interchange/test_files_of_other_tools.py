@@ -141,20 +141,6 @@ def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
             ),
             "a projection with a pose in it",
         ),
-        ({"images": [{"position": dict(x=0, y=0, z=0), "heading": dict(w=1, x=0, y=0, z=0)}]}, "no device_heading"),
-        ({"images": [{"position": {}, "heading": {}}] * 2, "device_heading": {}}, "2 cameras with a pose"),
-        ({"position": [0, 0, 0], "heading": [1, 0, 0]}, "heading: expected 4 numbers, found 3"),
-        (
-            {
-                "extrinsics": {
-                    "translation": dict(x=0, y=0, z=0),
-                    "rotation": dict(zip(("qx", "qy", "qz", "qw"), TURN, strict=True)),
-                },
-                "camera_convention": "Unity",
-            },
-            "'Unity' is neither OpenGL nor OpenCV",
-        ),
-        ({"extrinsics": {"translation": dict(x=0, y=0, z=0)}}, "extrinsics.rotation: missing"),
         (
             {"transforms": [{"parent_frame_id": "base", "child_frame_id": name} for name in ("camera", "radar")]},
             "transforms[0].translation: missing",
@@ -203,21 +189,6 @@ def test_the_oldest_hand_eye_file_has_its_parameters_at_the_top():
     found = read_any(text + "".join(f"  {key}: {value}\n" for key, value in numbers.items()))
     assert found.format == "easy_handeye"
     np.testing.assert_allclose(found.pose.translation_m, POSITION)
-
-
-def test_scale_s_lens_is_read_if_it_is_one_of_ours():
-    frame = {"position": POSITION, "heading": [TURN[3], *TURN[:3]], "fx": 500.0, "fy": 501.0, "cx": 320.0, "cy": 240.0}
-    lenses = [
-        ({}, ("pinhole", 0)),
-        ({"k1": 0.1}, ("plumb_bob", 5)),
-        ({"k1": 0.1, "camera_model": "fisheye"}, ("equidistant", 4)),
-    ]
-    for more, (model, count) in lenses:
-        found = read_any(json.dumps({**frame, **more}))
-        assert (found.lens_model, len(found.distortion)) == (model, count)
-        assert found.matrix_px is not None
-    for more in ({"camera_model": "omnidirectional"}, {"k1": 0.1, "k5": 0.2}, {"k4": 0.1}):
-        assert read_any(json.dumps({**frame, **more})).matrix_px is None
 
 
 def test_where_a_camera_looks_tells_the_direction_only_if_one_direction_fits():
