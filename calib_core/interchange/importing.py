@@ -18,6 +18,7 @@ from calib_core.interchange.calibration_file import (
     choose_check_point,
 )
 from calib_core.interchange.check.pair_residuals import CheckPairs
+from calib_core.interchange.check.pixel_differences import lenses_of
 from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.format import TRUTH_FORMAT, ImportedCalibration
 from calib_core.interchange.formats.registry import is_ours, reader_of, readers
@@ -366,24 +367,14 @@ def _refuse_another_camera(imported: ImportedCalibration, given: Camera, *, sour
     Raises:
         InputError: they image a ray more than half a pixel apart.
     """
-    stated, compared = imported.camera, given
-    if stated is None and imported.matrix_px is not None:
-        size = given.width_px, given.height_px
-        stated = imported.camera_for(size)
-        if not imported.distortion.any() and imported.lens_model == "pinhole":
-            compared = Camera("pinhole", *size, given.matrix_px)
-    apart_px = largest_difference_px(stated, compared) if stated is not None else 0.0
-    if stated is None or apart_px <= _SAME_LENS_PX:
+    lenses = lenses_of(imported, ImportedCalibration("given", imported.pose, camera=given), None)
+    lens = lenses.difference if lenses is not None else None
+    if lens is None or lens.max_px <= _SAME_LENS_PX:
         return
-    in_file, in_given = (
-        f"{one.width_px} x {one.height_px} px, fx {one.matrix_px[0, 0]:.6g}, cx {one.matrix_px[0, 2]:.6g}, "
-        f"cy {one.matrix_px[1, 2]:.6g}, {one.model}"
-        for one in (stated, compared)
-    )
-    apart = f", up to {apart_px:.3g} px apart" if np.isfinite(apart_px) else ""
+    apart = "" if np.isnan(lens.max_px) else f", up to {lens.max_px:.3g} px apart"
     raise InputError(
-        f"{source}: states a camera ({in_file}) other than the given one ({in_given}){apart}; omit --camera, or take the given "
-        "one with --replace-camera"
+        f"{source}: states a camera other than the given one ({lens.text}){apart}; omit --camera, or take the given one with "
+        "--replace-camera"
     )
 
 
@@ -432,21 +423,3 @@ def _imported_warning(imported: ImportedCalibration, source: str) -> DataWarning
         f"imported from {PurePath(source).name} ({imported.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
-
-
-_GRID = 9
-
-
-def largest_difference_px(a: Camera, b: Camera) -> float:
-    """Return the largest distance [px] between the pixels of one ray, over the image of the first camera.
-
-    Infinite if the images have different sizes, or the second camera does not image a ray of the first.
-    """
-    if (a.width_px, a.height_px) != (b.width_px, b.height_px):
-        return float("inf")
-    columns, rows = np.linspace(0, a.width_px - 1, _GRID), np.linspace(0, a.height_px - 1, _GRID)
-    pixels_px = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    rays = a.rays(pixels_px)
-    seen = np.isfinite(rays).all(axis=1)
-    apart_px = np.linalg.norm(b.project(rays[seen]) - pixels_px[seen], axis=1)
-    return float(np.where(np.isfinite(apart_px), apart_px, np.inf).max(initial=0.0))

@@ -612,30 +612,20 @@ def _comparison(report: CheckReport) -> dict[str, Any] | None:
     both, judgement = report.comparison, report.judgement
     if both is None or judgement is None:
         return None
-    lens = None if both.lens is None else {"rms_px": _number(both.lens.rms_px), "differs": both.lens.text}
+    lens = None if both.lens is None else {"rms_px": both.lens.rms_px, "differs": both.lens.text}
     return {
         "agree": judgement.agree,
         "significant": judgement.significant,
         "basis": judgement.basis,
         "criteria": [
-            {"name": one.name, "value": _number(one.value), "limit": one.limit, "met": one.met}
+            {"name": one.name, "value": one.value, "limit": one.limit, "met": one.met}
             for one in judgement.criteria
         ],
         "rotation_deg": both.rotation_deg,
-        "rotation_sigma_deg": _number(both.rotation_sigma_deg),
+        "rotation_sigma_deg": both.rotation_sigma_deg,
         "position_cm": both.position_cm,
-        "position_sigma_cm": _number(both.position_sigma_cm),
-        "pixels": [
-            {
-                "distance_m": at.distance_m,
-                "rms_px": _number(at.rms_px),
-                "max_px": _number(at.max_px),
-                "sigma_px": _number(at.sigma_px),
-                "pose_rms_px": _number(at.pose_rms_px),
-                "lost_share": at.lost_share,
-            }
-            for at in both.pixels
-        ],
+        "position_sigma_cm": both.position_sigma_cm,
+        "pixels": msgspec.to_builtins(both.pixels),
         "lens": lens,
         **_change(report),
         "covariances": both.covariances,
@@ -653,11 +643,6 @@ def _change(report: CheckReport) -> dict[str, Any]:
         "sigmas": None if change is None else change.sigmas,
         "noticeable": report.noticeable,
     }
-
-
-def _number(value: float) -> float | None:
-    """Return a number that JSON has: None for infinite and unknown ones."""
-    return float(value) if np.isfinite(value) else None
 
 
 def check_junit(files: Sequence[CheckedFile]) -> str:

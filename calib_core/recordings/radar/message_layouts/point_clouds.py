@@ -83,9 +83,10 @@ class CloudLayout:
         Raises:
             MessageError: the message is inconsistent.
         """
-        fast = self._by_known_bytes(payload)
+        row = np.frombuffer(payload, dtype=np.uint8)[None]
+        fast = self.returns_of_rows(row, np.array([len(payload)])) if self._known else None
         if fast is not None:
-            return fast
+            return fast[0]
         message = decode(self.definition, payload)
         order = payload_byte_order(payload, self.definition)
         data = message.octets("data")
@@ -137,26 +138,6 @@ class CloudLayout:
     def _remember(self, block: bytes, shape: _Shape) -> None:
         if len(self._known) < 16:
             self._known[block] = shape
-
-    def _by_known_bytes(self, payload: bytes) -> Returns | None:
-        """Read a one-row cloud with a known field description; None for any other."""
-        if not self._known:
-            return None
-        try:
-            start = _after_header(payload, self.definition)
-            height, width = struct.unpack_from("<II", payload, start)
-            for block, shape in self._known.items():
-                end = start + 8 + len(block)
-                if height != 1 or payload[start + 8 : end] != block:
-                    continue
-                _, size = struct.unpack_from("<II", payload, end)
-                if size != width * shape.dtype.itemsize or end + 8 + size > len(payload):
-                    return None
-                returns = _returns(np.frombuffer(payload, shape.dtype, width, end + 8), shape.plan)
-                return _unless_marked(returns, np.array([any(payload[end + 8 + size :][:1])]), np.array([width]))
-        except struct.error:
-            return None
-        return None
 
 
 def lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
