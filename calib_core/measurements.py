@@ -242,23 +242,30 @@ class RadarScans:
     def between(self, start: TimeNs, end: TimeNs) -> "RadarScans":
         """Keep the scans with start <= stamp <= end."""
         first = int(np.searchsorted(self.times_ns, start, side="left"))
-        last = max(int(np.searchsorted(self.times_ns, end, side="right")), first)
+        return self.part(first, max(int(np.searchsorted(self.times_ns, end, side="right")), first))
+
+    def part(self, first: int, last: int) -> "RadarScans":
+        """Keep the scans first to last - 1."""
+        if first == 0 and last == len(self):
+            return self
         low, high = int(self.first_return[first]), int(self.first_return[last])
-        return RadarScans(
-            times_ns=self.times_ns[first:last],
-            first_return=self.first_return[first : last + 1] - low,
-            points_radar_m=self.points_radar_m[low:high],
-            doppler_mps=self.doppler_mps[low:high],
-            snr_db=self.snr_db[low:high],
-            sigma_polar=self.sigma_polar[low:high],
-            alternative_of=None if self.alternative_of is None else self.alternative_of[low:high],
-        )
+        return self.with_rows(slice(low, high), self.times_ns[first:last], self.first_return[first : last + 1] - low)
 
     def take(self, rows: Indices) -> "RadarScans":
         """Keep the returns of the given rows, ascending; every scan is kept, even if it becomes empty."""
+        return self.with_rows(rows, self.times_ns, np.searchsorted(rows, self.first_return))
+
+    def with_rows(self, rows: Indices | slice, times_ns: TimesNs, first_return: Indices) -> "RadarScans":
+        """Return other scans, made of some rows of these.
+
+        Args:
+            rows: (n,) of the returns.
+            times_ns: (m,) of the scans.
+            first_return: (m + 1,) into the rows.
+        """
         return RadarScans(
-            times_ns=self.times_ns,
-            first_return=np.searchsorted(rows, self.first_return),
+            times_ns=times_ns,
+            first_return=first_return,
             points_radar_m=self.points_radar_m[rows],
             doppler_mps=self.doppler_mps[rows],
             snr_db=self.snr_db[rows],

@@ -46,7 +46,6 @@ def _contradictions(name: str, plan: ColumnPlan, returns: Returns) -> list[DataW
     return [
         *_range(name, plan, claimed[:, 0], own[:, 0]),
         *_azimuth(name, plan, claimed[:, 1], own[:, 1]),
-        *_elevation(name, plan, claimed[:, 2], own[:, 2]),
     ]
 
 
@@ -117,19 +116,6 @@ def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) 
             "radar-azimuth-mirrored",
             f"{columns} have opposite signs; the positions are used, with y to the left",
             f"if y points to the right: {_MIRROR}; the handedness check of the calibration shows which is right",
-        )
-    ]
-
-
-def _elevation(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) -> list[DataWarning]:
-    known = np.isfinite(claimed)
-    if not known.any() or claimed[known].any() or float(np.median(np.abs(own[known]))) < _MIN_ANGLE_RAD:
-        return []
-    return [
-        DataWarning.reported(
-            "radar-elevation-zero",
-            f"{name}: {plan.claimed[2]} is always 0, but the heights of the positions are not; the positions are used",
-            "no action needed if the driver just does not fill in the angle; otherwise ask its authors what z means",
         )
     ]
 

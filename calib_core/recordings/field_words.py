@@ -339,8 +339,6 @@ def spelt(spellings: Iterable[Spelling]) -> Mapping[frozenset[str], Spelling]:
     return found
 
 
-SPELT: Mapping[frozenset[str], Spelling] = spelt(SPELLINGS)
-"""The shared spellings."""
 _SPELT_IN_MESSAGES = spelt((*SPELLINGS, *AMBIGUOUS))
 _SPELT_IN_TABLES = spelt((*SPELLINGS, *TABLE_ANGLES))
 

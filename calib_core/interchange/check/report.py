@@ -618,8 +618,7 @@ def _comparison(report: CheckReport) -> dict[str, Any] | None:
         "significant": judgement.significant,
         "basis": judgement.basis,
         "criteria": [
-            {"name": one.name, "value": one.value, "limit": one.limit, "met": one.met}
-            for one in judgement.criteria
+            {"name": one.name, "value": one.value, "limit": one.limit, "met": one.met} for one in judgement.criteria
         ],
         "rotation_deg": both.rotation_deg,
         "rotation_sigma_deg": both.rotation_sigma_deg,

@@ -3,7 +3,7 @@
 import errno
 import sqlite3
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -295,19 +295,9 @@ class MessageBuilder:
         )
 
     def _radar_return(self, body: RadarReturnMessage) -> Any:
-        return self._new(
-            body,
-            header=self._header(body),
-            point_id=body.point_id,
-            x=body.x_m,
-            y=body.y_m,
-            z=body.z_m,
-            range=body.range_m,
-            velocity=body.velocity_mps,
-            doppler_bin=body.doppler_bin,
-            bearing=body.bearing_deg,
-            intensity=body.intensity_db,
-        )
+        """Build the message: its fields follow the header in the order of ours."""
+        names = [line.split()[1] for line in RADAR_SCAN_DEFINITION.splitlines()[1:]]
+        return self._new(body, header=self._header(body), **dict(zip(names, astuple(body)[-len(names) :], strict=True)))
 
     def _cloud(self, body: CloudMessage) -> Any:
         field = self.typestore.types["sensor_msgs/msg/PointField"]

@@ -539,29 +539,52 @@ class _UnitInference:
         sides: tuple[str, ...] = (),
     ) -> tuple[list[Unit], str, ColumnAssumption | None]:
         """Return the unit of each column of a position or range, what states it, and what is assumed."""
-        stated = next((one for one in group if one.unit), None)
-        usual = stated.unit if stated and stated.unit else _unit("m")
-        units = [one.unit or usual for one in group]
-        largest = farthest(*(one.column.values * unit.scale for one, unit in zip(group, units, strict=True)))
-        names = ", ".join(one.name for one in group)
-        if stated or (standard and largest <= FARTHEST_M):
-            why = stated.why if stated else self.rule
-            if largest <= FARTHEST_M or self.of_table:
-                return units, why, None
-            what = f"{names} would reach {largest:.4g} m in {usual.name} ({why})"
-            text = f"{what}, which is too far; the unit is taken all the same"
-            return units, why, self._unit_assumption("length-unit", text, group, usual, sides)
-        largest = farthest(*(one.column.values for one in group))
-        finding = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
-        units = [finding.unit] * len(group)
-        if finding is proven or (finding.certain and not self.of_table and all(one.named for one in group)):
-            return units, finding.why, None
-        self._refuse_either(group, finding)
-        return (
-            units,
-            "assumed",
-            self._unit_assumption("length-unit", self._by_values(names, finding), group, finding.unit, sides),
+        stated = next((one.unit for one in group if one.unit), None)
+        scales = ((one.unit or stated or _unit("m")).scale for one in group)
+        largest = farthest(*(one.column.values * scale for one, scale in zip(group, scales, strict=True)))
+        but = (
+            f"they would reach {largest:.4g} m, which is too far" if largest > FARTHEST_M and not self.of_table else ""
         )
+        integer = any(one.column.integer for one in group)
+        finding = proven or _length_unit(farthest(*(one.column.values for one in group)), integer=integer)
+        certain = finding is proven or (finding.certain and not self.of_table and all(one.named for one in group))
+        ruled = _unit("m") if standard and not but else None
+        unit, why, about = self._decided("length-unit", group, finding, ruled, certain=certain, but=but, sides=sides)
+        return [one.unit or unit for one in group], why, about
+
+    def _decided(
+        self,
+        key: str,
+        group: tuple[ColumnMatch, ...],
+        finding: "Finding",
+        ruled: Unit | None,
+        *,
+        certain: bool,
+        but: str = "",
+        sides: tuple[str, ...] = (),
+    ) -> tuple[Unit, str, ColumnAssumption | None]:
+        """Return the unit of columns, what states it, and what is assumed.
+
+        Args:
+            key: of the assumption.
+            group: the columns, of which one may state the unit.
+            finding: by their values.
+            ruled: the unit by the registry or ROS; None if neither defines it.
+            certain: whether the values leave no doubt.
+            but: how the values contradict a stated unit; "" if they do not.
+            sides: where x, y and z point.
+        """
+        stated = next((one for one in group if one.unit), None)
+        unit, names = (stated.unit if stated else None) or ruled, ", ".join(one.name for one in group)
+        if unit is not None:
+            why = stated.why if stated else self.rule
+            text = f"{_are(names)} taken as {unit.name} ({why}), although {but}"
+            return unit, why, self._unit_assumption(key, text, group, unit, sides) if but else None
+        if certain:
+            return finding.unit, finding.why, None
+        self._refuse_either(group, finding)
+        text = self._by_values(names, finding)
+        return finding.unit, "assumed", self._unit_assumption(key, text, group, finding.unit, sides)
 
     def _by_values(self, names: str, finding: "Finding") -> str:
         """Say which unit is assumed."""
@@ -684,25 +707,18 @@ class _UnitInference:
     def _angle(self, angles: tuple[ColumnMatch, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
         """Return the unit of angles, what states it, and what is assumed."""
         stated = next((angle for angle in angles if angle.unit), None)
-        names = ", ".join(angle.name for angle in angles)
         finding = _angle_unit(angles[0].column.values, integer=angles[0].column.integer)
+        but = ""
         if stated and stated.unit:
-            unit = stated.unit
             unstated = [angle for angle in angles if angle.unit is None]
-            if unstated and unit.name not in ("rad", "deg"):
-                self._refuse_either(unstated, Finding(unit, False, f"values beside {stated.name}", _unit("deg")))
-            if self.of_table or stated.mapped or not _implausible(angles[0], unit, finding):
-                return unit, stated.why, None
-            but = f"although the values look like {finding.unit.name}: {finding.why}"
-            text = f"{_are(names)} taken as {unit.name} ({stated.why}), {but}"
-            return unit, stated.why, self._unit_assumption("angle-unit", text, angles, unit)
-        if self.decoder and all(angle.named for angle in angles):
-            return _unit("deg" if self.decoder.degrees else "rad"), self.rule, None
-        if finding.certain and not (self.of_table and finding.unit.name == "rad"):
-            return finding.unit, finding.why, None
-        self._refuse_either(angles, finding)
-        text = self._by_values(names, finding)
-        return finding.unit, "assumed", self._unit_assumption("angle-unit", text, angles, finding.unit)
+            if unstated and stated.unit.name not in ("rad", "deg"):
+                self._refuse_either(unstated, Finding(stated.unit, False, f"values beside {stated.name}", _unit("deg")))
+            if not (self.of_table or stated.mapped) and _implausible(angles[0], stated.unit, finding):
+                but = f"the values look like {finding.unit.name}: {finding.why}"
+        certain = finding.certain and not (self.of_table and finding.unit.name == "rad")
+        decoder = self.decoder if all(angle.named for angle in angles) else None
+        ruled = _unit("deg" if decoder.degrees else "rad") if decoder else None
+        return self._decided("angle-unit", angles, finding, ruled, certain=certain, but=but)
 
     def _azimuth_sign(self, azimuth: ColumnMatch, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
         if azimuth.mapped:

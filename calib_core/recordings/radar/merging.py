@@ -120,15 +120,7 @@ def aligned(scans: RadarScans, numbers: Indices, times_ns: TimesNs) -> RadarScan
     counts = np.where(numbers >= 0, np.append(np.diff(scans.first_return), 0)[numbers], 0)
     first = np.concatenate([[0], np.cumsum(counts)])
     rows = np.repeat(scans.first_return[numbers] - first[:-1], counts) + np.arange(first[-1])
-    return RadarScans(
-        times_ns=times_ns,
-        first_return=first,
-        points_radar_m=scans.points_radar_m[rows],
-        doppler_mps=scans.doppler_mps[rows],
-        snr_db=scans.snr_db[rows],
-        sigma_polar=scans.sigma_polar[rows],
-        alternative_of=None if scans.alternative_of is None else scans.alternative_of[rows],
-    )
+    return scans.with_rows(rows, times_ns, first)
 
 
 def merged(parts: Sequence[RadarScans], spreads: Sequence[Spread], repeats: Sequence[int]) -> RadarScans:

@@ -97,7 +97,7 @@ class ScanBlocks(ABC):
         pieces = []
         for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
             block, base = self._block(number), number * _BLOCK_SCANS
-            pieces.append(_keep_scans(block, max(first - base, 0), min(last - base, len(block))))
+            pieces.append(block.part(max(first - base, 0), min(last - base, len(block))))
         return RadarScans.joined(pieces)
 
     def _block(self, number: int) -> RadarScans:
@@ -126,22 +126,6 @@ class ScanBlocks(ABC):
         """Decode at most count scans spread evenly over the recording."""
         places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
         return self.decoded(np.unique(places.astype(np.int64)))
-
-
-def _keep_scans(scans: RadarScans, first: int, last: int) -> RadarScans:
-    """Keep the scans first to last - 1."""
-    if first == 0 and last == len(scans):
-        return scans
-    low, high = int(scans.first_return[first]), int(scans.first_return[last])
-    return RadarScans(
-        times_ns=scans.times_ns[first:last],
-        first_return=scans.first_return[first : last + 1] - low,
-        points_radar_m=scans.points_radar_m[low:high],
-        doppler_mps=scans.doppler_mps[low:high],
-        snr_db=scans.snr_db[low:high],
-        sigma_polar=scans.sigma_polar[low:high],
-        alternative_of=None if scans.alternative_of is None else scans.alternative_of[low:high],
-    )
 
 
 class RadarStream(ScanBlocks):

@@ -9,7 +9,6 @@ from calib_core.errors import OptionError
 from calib_core.recordings.field_words import (
     AMBIGUOUS,
     SPELLINGS,
-    SPELT,
     SUBJECTS,
     UNITS_BY_SPELLING,
     MappedColumn,
@@ -25,6 +24,8 @@ from calib_core.recordings.plain_files.tables.times import time_name
 from calib_core.recordings.radar.column_guess import table_meaning
 
 MEASURED = {"length": "range", "angle": "azimuth", "speed": "doppler", "level": "snr", "time": "time"}
+
+SPELT = spelt(SPELLINGS)
 
 
 def test_a_spelling_means_the_same_as_a_column_and_as_a_field():

@@ -131,7 +131,6 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
         ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored"),
         ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored"),
         ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts"),
-        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero"),
     ],
 )
 def test_columns_that_contradict_the_positions_give_a_warning(columns, code, ros1, write, cloud_points):
