@@ -99,7 +99,7 @@ def _excluded_words(excluded: DataWarning | None) -> str:
     if excluded is None:
         return ""
     facts = excluded.facts
-    return f"{len(facts['ids'])} excluded by residual (mean reprojection error with them {facts['all_aed_px']:.3g} px)"
+    return f"{len(facts['ids'])} excluded by residual (AED of all {facts['all_aed_px']:.3g} px)"
 
 
 def _reason(verdict: Verdict) -> Words:

@@ -367,7 +367,9 @@ _RULES = (
     _Rule(lambda now: now.outcome is None, lambda _: words("No answer yet"), "calm"),
     _Rule(
         lambda now: _is(now, "too-few-pairs"),
-        lambda now: words(f"{len(now.outcome.pairs) if now.outcome else 0} of {SURE_PAIRS} pairs"),
+        lambda now: words(
+            f"{now.outcome.facts.get('used', 0) if isinstance(now.outcome, Unsolvable) else 0} of {SURE_PAIRS} pairs"
+        ),
         "calm",
     ),
     _Rule(

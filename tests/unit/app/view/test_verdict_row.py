@@ -15,7 +15,7 @@ from calib_core.words.verdict import error_text
 from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.build import verdict_row
 from cocalib.view.click_rows import disagreement
-from tests.unit.app.view.test_view import FIVE, calibration, pair, shown
+from tests.unit.app.view.test_view import ASKING, FIVE, calibration, pair, shown
 
 ERROR = StatedError(rotation_deg=0.3, position_cm=3.0, image_px=4.0, range_m=9.0, in_plane=False)
 ASSUMED = Assumed(measured=False, alone_cm=np.nan, not_mirrored=True, elevations=True, principal_point_px=5.0)
@@ -38,6 +38,14 @@ def test_an_action_that_an_option_does_names_it():
     session = Session(clicks=(ReflectorClick(TimeNs(0), "c1", 1.0, 1.0),), options=near, outcome=lost)
     assert verdict_row(verdict_on(lost), session, None).option == "gating.max_range_m"
     assert verdict_row(verdict_on(lost), replace(session, options=CalibrationOptions()), None).option == ""
+
+
+def test_excluded_clicks_do_not_count_as_pairs():
+    facts = {"used": 3, "needed": 4, "excluded": 2, "unpaired": 0}
+    pairs = (FIVE[number].measured or ASKING.measured for number in range(5))
+    few = Unsolvable("too-few-pairs", facts, pairs=tuple(pairs))
+    session = Session(clicks=(ReflectorClick(TimeNs(0), "c1", 1.0, 1.0),), outcome=few)
+    assert re.findall(r"\d+", str(verdict_row(verdict_on(few), session, None).line)) == ["3", "8"]
 
 
 TWO_POSES = DataWarning.reported(
