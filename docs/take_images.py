@@ -82,7 +82,7 @@ def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any
     shoot(driver, "pose")
     driver.page.click("#panel-large")
     driver.press("5")
-    driver.until("document.querySelectorAll('.review-candidates tr').length > 1")
+    driver.until("document.querySelectorAll('.review-pair dd').length > 1")
     shoot(driver, "review")
     driver.page.close()
     shoot(opened(browser, server, "light"), "light")

@@ -609,7 +609,7 @@ export interface PairCandidates {
 }
 
 /** What a review shows of one pair beyond its row; written as an array. */
-export type ReviewRow = [id: string, influence: number | null, held_out_px: number | null, sigmas: number | null];
+export type ReviewRow = [id: string, influence: number | null, held_out_px: number | null];
 
 /** The review of all pairs of an answer. */
 export interface Review {
@@ -619,26 +619,12 @@ export interface Review {
   words: Words;
 }
 
-/** One radar position that may be the reflector, as final text. */
-export interface ReviewedReturn {
-  chosen: boolean;
-  range: string;
-  direction: string;
-  score: string;
-  snr: string;
-  seen: string;
-  distance: string;
-  u_px: number | null;
-  v_px: number | null;
-}
-
 /** One pair under the pose. */
 export interface PairReview {
   type: "pair_review";
   id: string;
   why: Words;
   facts: Figure[];
-  candidates: ReviewedReturn[];
 }
 
 /** One figure of the comparison, as `cocalib check --against` prints it. */

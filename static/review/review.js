@@ -294,22 +294,7 @@ function pairParts(pair) {
     box.dataset.hint = fact.hint;
     return box;
   });
-  const heads = ["used", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
-  const head = make("tr", "", heads.map((name) => {
-    const cell = make("th", "", name);
-    cell.scope = "col";
-    return cell;
-  }));
-  const lines = pair.candidates.map((one) => {
-    const mark = make("td", "", one.chosen ? "●" : "○");
-    mark.setAttribute("aria-label", one.chosen ? "used" : "not used");
-    return make("tr", one.chosen ? "chosen" : "", [mark, ...[one.range, one.direction, one.score, one.snr, one.seen, one.distance].map((text) => make("td", "", text))]);
-  });
-  const scroll = make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])]);
-  scroll.tabIndex = 0; // a narrow panel scrolls it
-  scroll.setAttribute("role", "region");
-  scroll.setAttribute("aria-label", `Returns that ${nameOf(pair.id)} may use`);
-  return [make("h2", "", `Pair ${nameOf(pair.id)}`), make("p", "", said(pair.why)), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
+  return [make("h2", "", `Pair ${nameOf(pair.id)}`), make("p", "", said(pair.why)), make("dl", "", facts)];
 }
 
 /** Limits of an axis, a little beyond its values. @param {number[]} values */

@@ -139,7 +139,6 @@ def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_l
     page.page.click(".review-why summary")
     page.until("document.querySelector('.review-pair h2').textContent === 'Pair 5'")
     assert "6.41 m return" in page.text(".review-pair")
-    assert page.page.locator(".review-candidates tbody tr").count() > 1
 
     page.page.focus("[data-plot=time]")
     page.press("ArrowRight", "ArrowRight")

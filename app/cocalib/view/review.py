@@ -1,6 +1,5 @@
 """The page Check: what is beyond the rows of all pairs, which return one pair uses and why, two solutions side by side."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,14 +11,13 @@ from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.check.agreement import compare
 from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.measurements import Candidate
-from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from calib_core.results.calibration import CHI2_95_2
 from calib_core.words.outcomes import said_of
 from calib_core.words.text import Words, join, named, say, words
 from cocalib.session.applying import History
 from cocalib.view.model import Figure
-from cocalib.view.wording import direction_words, plain, sentence
+from cocalib.view.wording import plain, sentence
 
 
 class ReviewRow(msgspec.Struct, frozen=True, array_like=True):
@@ -29,13 +27,11 @@ class ReviewRow(msgspec.Struct, frozen=True, array_like=True):
         id: the click's id.
         influence: how far leaving it out moves the pose, in standard deviations; None if unknown.
         held_out_px: distance from the click to where the other pairs predict it; None if unknown.
-        sigmas: length of the residual over what the noise model expects in its direction; None without a noise model.
     """
 
     id: str
     influence: float | None
     held_out_px: float | None
-    sigmas: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +54,7 @@ def review_of(calibration: Calibration | None, revision: int) -> Review:
     if calibration is None or not calibration.pairs:
         return Review(revision, (), words("Available after the first calibration."))
     rows = tuple(
-        ReviewRow(pair.id, _rounded(pair.influence, 3), _rounded(pair.held_out_px, 2), _rounded(sigmas, 3))
-        for pair, sigmas in zip(calibration.pairs, _sigmas(calibration).tolist(), strict=True)
+        ReviewRow(pair.id, _rounded(pair.influence, 3), _rounded(pair.held_out_px, 2)) for pair in calibration.pairs
     )
     return Review(revision, rows, _words(calibration))
 
@@ -102,33 +97,6 @@ _MUCH_CLOSER = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class ReviewedReturn:
-    """One radar position that may be the reflector, as final text.
-
-    Attributes:
-        chosen: the pair uses it.
-        range: from the radar.
-        direction: azimuth and elevation in words.
-        score: plausibility before any pose is known.
-        snr: mean of its returns; a dash if the radar reports none.
-        seen: how many returns it averages, and from how many scans.
-        distance: from the click to its reprojection.
-        u_px: column of its reprojection; None if the camera does not see it.
-        v_px: row of its reprojection.
-    """
-
-    chosen: bool
-    range: str
-    direction: str
-    score: str
-    snr: str
-    seen: str
-    distance: str
-    u_px: float | None
-    v_px: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class PairReview:
     """One pair under the pose.
 
@@ -136,13 +104,11 @@ class PairReview:
         id: the click's id.
         why: which return it uses, and why this one.
         facts: figures about it.
-        candidates: the most plausible first; empty if they were not kept.
     """
 
     id: str
     why: Words
     facts: tuple[Figure, ...] = ()
-    candidates: tuple[ReviewedReturn, ...] = ()
 
 
 def pair_review(calibration: Calibration, name: str) -> PairReview:
@@ -158,31 +124,9 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
         kept = words("The radar positions that this pair could have used were not kept.")
         return PairReview(name, kept, facts)
     points = np.array([candidate.position_radar_m for candidate in candidates])
-    pixels = calibration.reproject(points)
-    distances_px = np.linalg.norm(pixels - pair.pixel_px, axis=1)
-    rows = tuple(
-        _row(candidate, pixel, float(distance_px), chosen=i == pair.candidate)
-        for i, (candidate, pixel, distance_px) in enumerate(zip(candidates, pixels, distances_px, strict=True))
-    )
+    distances_px = np.linalg.norm(calibration.reproject(points) - pair.pixel_px, axis=1)
     facts = (*facts, *_noise_fact(candidates[pair.candidate]))
-    return PairReview(name, words(_why(pair, candidates, distances_px)), facts, rows)
-
-
-def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> ReviewedReturn:
-    range_m, azimuth, elevation = polar_from_cartesian(candidate.position_radar_m[None])[0].tolist()
-    side, height = direction_words(math.degrees(azimuth), "left", "right"), math.degrees(elevation)
-    seen = bool(np.isfinite(pixel).all())
-    return ReviewedReturn(
-        chosen=chosen,
-        range=f"{range_m:.2f} m",
-        direction=f"{side}, {direction_words(height, 'up', 'down')}",
-        score=plain(candidate.score, 2),
-        snr=f"{candidate.snr_db:.0f} dB" if np.isfinite(candidate.snr_db) else "–",
-        seen=f"{candidate.returns} in {candidate.scans}",
-        distance=f"{plain(distance_px)} px" if np.isfinite(distance_px) else "not in the image",
-        u_px=round(float(pixel[0]), 2) if seen else None,
-        v_px=round(float(pixel[1]), 2) if seen else None,
-    )
+    return PairReview(name, words(_why(pair, candidates, distances_px)), facts)
 
 
 def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values) -> str:

@@ -37,7 +37,9 @@ class Crops:
 
     def keep_marks(self, view: View) -> None:
         """Make the cut-outs of all marks, one at a time between those that are asked for."""
-        self._marks = [(row.image_time.time, round(row.u_px, 2), round(row.v_px, 2), CROP_PX) for row in view.clicks]
+        self._marks = [
+            (int(row.image_time.time), round(row.u_px, 2), round(row.v_px, 2), CROP_PX) for row in view.clicks
+        ]
         self.thread.submit(self._make_next)
 
     def end(self) -> None:

@@ -60,16 +60,13 @@ def test_without_noise_model_nothing_is_expected(solved):
     pairs = tuple(replace(pair, expected_covariance_px2=unknown) for pair in solved.pairs)
     review = review_of(replace(solved, pairs=pairs), 3)
 
-    assert all(row.sigmas is None for row in review.rows)
+    assert "%" not in str(review.words)
     assert review_of(None, -1).rows == ()
 
 
-def test_a_pair_lists_all_its_candidates_and_says_which_one_it_uses(solved):
+def test_a_pair_says_which_of_its_candidates_it_uses(solved):
     for pair in solved.pairs:
         told = pair_review(solved, pair.id)
-        assert [row.chosen for row in told.candidates] == [
-            i == pair.candidate for i in range(len(pair.measured.candidates))
-        ]
         assert f"{np.linalg.norm(pair.point_radar_m):.2f} m" in str(told.why)
     assert "held_out" in {fact.key for fact in told.facts}
 
@@ -136,7 +133,7 @@ def test_the_answer_before_the_last_change_is_found(solved):
     assert previous_calibration(history) is earlier
 
 
-def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved):
+def test_a_return_chosen_by_hand_is_told(solved):
     pair = next(pair for pair in solved.pairs if pair.inlier and pair.measured is not None and pair.candidate == 0)
     first, *rest = pair.measured.candidates
     chosen = ChosenReturn(tuple(first.position_radar_m.tolist()))
@@ -144,4 +141,3 @@ def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved)
     told = pair_review(replace(solved, pairs=(by_hand,)), pair.id)
 
     assert "chosen by hand" in str(told.why)
-    assert [row.chosen for row in told.candidates] == [True] + [False] * len(rest)
