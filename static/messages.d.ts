@@ -657,7 +657,6 @@ export interface Contour {
 /** Where points at one distance may appear. */
 export interface ContourMap {
   label: string;
-  distance_m: number;
   words: string;
   contours: Contour[];
 }

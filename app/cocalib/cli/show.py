@@ -90,7 +90,7 @@ class Show:
             raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
         from calib_core.recordings import video_format, write_video
         from calib_core.words.warnings import warning_remark
-        from cocalib.solving.recorded_clicks import seconds_text
+        from cocalib.session.applying import seconds
 
         video_format(out)
         with (
@@ -99,7 +99,7 @@ class Show:
             progress_bar("writing frames") as progress,
         ):
             written = write_video(recording, part, progress=progress)
-        print(f"{out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
+        print(f"{out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds(written.start)}")
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):
                 print(warning_remark(warning).message)

@@ -10,7 +10,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import read_text
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable, time_parts
+from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.recordings.field_words import units_for
@@ -123,9 +123,3 @@ def _require_inside(clicks: Sequence[ReflectorClick], camera: Camera, *, source:
                 f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "
                 f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording, in its pixels, column first"
             )
-
-
-def seconds_text(time: TimeNs) -> str:
-    """Write a stamp as seconds with all its digits."""
-    sec, nanosec = time_parts(time)
-    return f"{sec}.{nanosec:09d} s"

@@ -42,13 +42,11 @@ class ContourMap:
 
     Attributes:
         label: of the distance, such as "20 m".
-        distance_m: from the camera.
         words: the same in one or two sentences.
         contours: in order of their levels; empty if the uncertainty is unknown, or nearly the same everywhere.
     """
 
     label: str
-    distance_m: float
     words: str
     contours: tuple[Contour, ...]
 
@@ -65,7 +63,7 @@ def _contour_map(calibration: Calibration, distance_m: float, farthest_m: float)
     known = found.semi_major_px[np.isfinite(found.semi_major_px)]
     label = f"{distance_m:g} m"
     if not len(known):
-        return ContourMap(label, distance_m, "This method states no uncertainty, so there is nothing to draw.", ())
+        return ContourMap(label, "This method states no uncertainty, so there is nothing to draw.", ())
     lines = tuple(
         Contour(f"{level:g} px", line)
         for level in _levels(float(known.min()), float(known.max()))
@@ -77,7 +75,7 @@ def _contour_map(calibration: Calibration, distance_m: float, farthest_m: float)
     )
     if distance_m > farthest_m:
         words += f" The farthest pair is at {plain(farthest_m)} m: this is extrapolated."
-    return ContourMap(label, distance_m, words, lines)
+    return ContourMap(label, words, lines)
 
 
 def _levels(low_px: float, high_px: float) -> list[float]:

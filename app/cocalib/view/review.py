@@ -63,27 +63,13 @@ def _rounded(value: float, digits: int) -> float | None:
     return round(value, digits) if np.isfinite(value) else None
 
 
-def _sigmas(calibration: Calibration) -> Values:
-    """Return the Mahalanobis length (n,) of each residual; NaN where it is unknown."""
-    residuals = np.array([pair.residual_px for pair in calibration.pairs])
-    covariances = np.array([pair.expected_covariance_px2 for pair in calibration.pairs])
-    known = np.isfinite(residuals).all(axis=1) & np.isfinite(covariances).all(axis=(1, 2))
-    sigmas = np.full(len(residuals), np.nan)
-    whitened = np.linalg.solve(covariances[known], residuals[known][:, :, None])[:, :, 0]
-    sigmas[known] = np.sqrt((whitened * residuals[known]).sum(axis=1))
-    return sigmas
-
-
 def _words(calibration: Calibration) -> Words:
-    agreeing = np.array([pair.inlier for pair in calibration.pairs])
-    sigmas = _sigmas(calibration)[agreeing]
-    sigmas = sigmas[np.isfinite(sigmas)]
+    pairs = [pair for pair in calibration.pairs if pair.inlier and np.isfinite(pair.expected_covariance_px2).all()]
+    squared = [pair.residual_px @ np.linalg.solve(pair.expected_covariance_px2, pair.residual_px) for pair in pairs]
     said: list[Words | str] = ["This method has no noise model: no distribution is expected."]
-    if len(sigmas):
-        inside = int((sigmas**2 <= CHI2_95_2).sum())
-        said = [
-            f"{inside} of {len(sigmas)} agreeing clicks are inside their 95 % ellipse ({plain(0.95 * len(sigmas))} expected)."
-        ]
+    if pairs:
+        inside, expected = sum(one <= CHI2_95_2 for one in squared), plain(0.95 * len(pairs))
+        said = [f"{inside} of {len(pairs)} agreeing clicks are inside their 95 % ellipse ({expected} expected)."]
     influences = [(pair.influence, pair.id) for pair in calibration.pairs if np.isfinite(pair.influence)]
     if influences:
         most, name = max(influences)
