@@ -1,11 +1,17 @@
 """Read ROS 2 bags in SQLite (.db3), one message per row."""
 
+import shutil
 import sqlite3
 import threading
+from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -13,18 +19,8 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of, heads_from, keep_heads
-from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex, StoredChannel
-
-if TYPE_CHECKING:
-    from calib_core.recordings.containers.positioned_reads import FileBytes
-import shutil
-from collections import deque
-from dataclasses import dataclass, replace
-from itertools import chain
-from tempfile import TemporaryDirectory
-from urllib.parse import quote
-
 from calib_core.recordings.containers.positioned_reads import FileBytes
+from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex, StoredChannel
 
 _MAX_VALUE_BYTES = 1 << 28
 _BATCH_ROWS = 20_000
@@ -319,7 +315,7 @@ class SqliteSource:
         first_rows: read only this many rows, and refuse damaged ones; None reads all.
     """
 
-    def __init__(self, file: "FileBytes", *, packed: bool = False, first_rows: int | None = None) -> None:
+    def __init__(self, file: FileBytes, *, packed: bool = False, first_rows: int | None = None) -> None:
         self.path, self.size_bytes = file.path, file.size_bytes
         self.warnings: tuple[DataWarning, ...] = file.warnings
         self._file = file

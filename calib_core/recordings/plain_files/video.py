@@ -2,21 +2,17 @@
 
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
+from calib_core.recordings.camera.images import encoded_pixels
 from calib_core.recordings.plain_files.source import PlainSource, image_channel, image_message, topic_of
 from calib_core.recordings.time.written_times import read_time
 
-if TYPE_CHECKING:
-    pass
-
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mjpeg", ".ts")
 _FRAME = "camera"
-_JPEG_QUALITY = 95
 _STEP_BACK = 60
 
 
@@ -102,7 +98,6 @@ class _Video:
         Raises:
             MessageError: it cannot be decoded.
         """
-        import cv2
 
         with self._lock:
             if not 0 <= row - self._next <= _STEP_BACK:
@@ -115,11 +110,7 @@ class _Video:
             raise MessageError(
                 f"{self.path.name}: frame {row} cannot be decoded; the file is damaged from that frame on"
             )
-        settings = [
-            cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
-            cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
-        ]  # fmt: skip
-        return bytes(cv2.imencode(".jpg", pixels, settings)[1].tobytes())
+        return encoded_pixels(pixels).data
 
     def close(self) -> None:
         """Close the file."""

@@ -3,7 +3,6 @@
 import struct
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +11,8 @@ from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
 from calib_core.recordings.containers.mcap import records
 from calib_core.recordings.containers.mcap.recovery import scan_mcap
-from calib_core.recordings.containers.positioned_reads import FileStretch, MemoryStretch
+from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch
 from calib_core.recordings.containers.sources import MessageIndex
-
-if TYPE_CHECKING:
-    from calib_core.recordings.containers.positioned_reads import FileBytes
 
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _TAIL_BYTES = 37
@@ -34,7 +30,7 @@ class McapSource(ChunkedSource):
     format_name = "MCAP"
     lead_bytes = records.RECORD.size + records.MESSAGE_HEAD.size
 
-    def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
+    def __init__(self, file: FileBytes, *, first_of: ChannelFilter | None = None) -> None:
         super().__init__(file, whole=first_of is None)
         self._found: dict[int, list[np.ndarray]] = {}
         self._counted = self._private_bytes = 0

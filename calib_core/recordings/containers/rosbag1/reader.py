@@ -3,12 +3,12 @@
 import re
 import struct
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
+from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.index import (
     CONNECTION,
     ChunkInfo,
@@ -22,9 +22,6 @@ from calib_core.recordings.containers.rosbag1.index import (
 )
 from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
 from calib_core.recordings.containers.sources import Channel
-
-if TYPE_CHECKING:
-    from calib_core.recordings.containers.positioned_reads import FileBytes
 
 _MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
 _MESSAGE, _BAG_HEADER = 2, 3
@@ -44,7 +41,7 @@ class Rosbag1Source(ChunkedSource):
     format_name = "ROS 1 bag"
     lead_bytes = 4 + _MESSAGE_HEADER_BYTES + 4
 
-    def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
+    def __init__(self, file: FileBytes, *, first_of: ChannelFilter | None = None) -> None:
         super().__init__(file, whole=first_of is None)
         head = file.up_to(0, 4096)
         magic = _MAGIC.match(head)
