@@ -74,7 +74,7 @@ COMMANDS: Mapping[str, Command] = {
             "Calibrate a camera's lens from images of a board, or convert a file with intrinsics.",
             (
                 "drive.mcap --board 9x6 --square-mm 25 --out camera.yaml",
-                "camera.yaml --to mrcal --out camera.cameramodel",
+                "camera.yaml --to kalibr --out camchain.yaml",
             ),
         ),
         Command(

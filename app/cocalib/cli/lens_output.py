@@ -20,7 +20,7 @@ from cocalib.platform.terminal import print_exactly
 from cocalib.view.wording import plain, sentence, with_sigma
 
 CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".bin", ".conf")
-_BY_SUFFIX = {".json": "json", ".xml": "opencv-xml", ".cameramodel": "mrcal", ".mat": "matlab"}
+_BY_SUFFIX = {".json": "json", ".xml": "opencv-xml"}
 DOUBTFUL = frozenset(
     {
         "large-residuals",
@@ -135,7 +135,7 @@ def write_camera(camera: Camera, to: str | None, out: Path | None, *, told: Text
         told: where it is said that it was written; None for stdout.
 
     Raises:
-        InputError: the format cannot hold it, or is binary and there is no file.
+        InputError: the format cannot hold it.
     """
     from calib_core.interchange.cameras.files import camera_content
 
@@ -143,10 +143,8 @@ def write_camera(camera: Camera, to: str | None, out: Path | None, *, told: Text
     if out is not None:
         write_whole(out, content)
         print(f"written to {out}", file=told)
-    elif isinstance(content, str):
-        print_exactly(content)
     else:
-        raise InputError(f"--to {to} is a binary format; give the file with --out FILE")
+        print_exactly(content)
 
 
 def require_format(to: str | None) -> None:

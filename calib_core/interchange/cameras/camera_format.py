@@ -166,7 +166,7 @@ class CameraFormat:
     name: str
     title: str
     suffix: str
-    write: Callable[[Camera, str], str | bytes]
+    write: Callable[[Camera, str], str]
     own_syntax: OwnSyntax | None = None
     ending: str = ""
 
@@ -182,7 +182,7 @@ def refuse_skew(camera: Camera, whose: str) -> None:
         InputError: it has skew.
     """
     if camera.matrix_px[0, 1] != 0.0:
-        raise InputError(f"{whose} no skew, but this camera has; export with --to json or matlab instead")
+        raise InputError(f"{whose} no skew, but this camera has; export with --to json instead")
 
 
 def with_camera(imported: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:

@@ -137,9 +137,10 @@ def holds_camera(text: str, source: str = "camera") -> bool:
 
 def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
     """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
-    for value in CAMERA_FORMATS.values():
-        if value.own_syntax is not None and value.own_syntax.recognizes(content):
-            return value.own_syntax.read(content, source)
+    written = (known.own_syntax for known in CAMERA_FORMATS.values() if known.own_syntax is not None)
+    for syntax in (*written, MRCAL, KITTI_CAMERAS_FILE, MATLAB_PARAMETERS):
+        if syntax.recognizes(content):
+            return syntax.read(content, source)
     return ()
 
 
@@ -196,17 +197,14 @@ CAMERA_FORMATS: dict[str, CameraFormat] = {
         OPENCV_YAML,
         OPENCV_XML,
         OPENCV_JSON,
-        MRCAL,
         COLMAP_CAMERAS,
-        KITTI_CAMERAS_FILE,
-        MATLAB_PARAMETERS,
         OWN_JSON,
     )
 }
 """By name, in display order."""
 
 
-def camera_content(camera: Camera, to: str, name: str = "camera") -> str | bytes:
+def camera_content(camera: Camera, to: str, name: str = "camera") -> str:
     """Return the content of a file with a camera's intrinsics.
 
     Args:
@@ -220,5 +218,4 @@ def camera_content(camera: Camera, to: str, name: str = "camera") -> str | bytes
     if to not in CAMERA_FORMATS:
         raise InputError(f"no format {to!r} for intrinsics; {meant(to, CAMERA_FORMATS)}")
     form = CAMERA_FORMATS[to]
-    content = form.write(camera, name)
-    return content + form.ending if isinstance(content, str) else content
+    return form.write(camera, name) + form.ending

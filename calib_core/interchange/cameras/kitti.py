@@ -2,13 +2,8 @@
 
 import re
 
-from calib_core.camera import Camera
-from calib_core.errors import InputError
-from calib_core.file_tag import TAG
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, refuse_skew
+from calib_core.interchange.cameras.camera_format import FoundCamera, OwnSyntax
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.syntax.yaml_text import numbers_text
-from calib_core.lens_models.registry import written_lens
 
 _KEY = re.compile(r"^(K|D|S|P_rect|S_rect|R_rect|R|T|P)_?(\d{1,2}):\s*(.*)$")
 
@@ -61,18 +56,4 @@ def _size(values: dict[str, str], key: str, number: str, source: str) -> tuple[i
     return int(width), int(height)
 
 
-def _write(camera: Camera, _name: str) -> str:
-    refuse_skew(camera, "KITTI's cameras have")
-    lens = written_lens(camera.lens, camera.distortion, "camera_info")
-    if lens.name != "plumb_bob" or len(lens.coefficients) != 5:
-        raise InputError(f"KITTI's files have no {camera.model} lens; write ros, kalibr, opencv, colmap or json")
-    return (
-        f"calib_time: {TAG}\ncorner_dist: 0.0\n"
-        f"S_00: {numbers_text((float(camera.width_px), float(camera.height_px)), ' ')}\n"
-        f"K_00: {numbers_text(camera.matrix_px.ravel(), ' ')}\n"
-        f"D_00: {numbers_text(lens.coefficients, ' ')}\n"
-        "R_00: 1.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 1.0\nT_00: 0.0 0.0 0.0\n"
-    )
-
-
-KITTI_CAMERAS_FILE = CameraFormat("kitti", "KITTI calib_cam_to_cam.txt", ".txt", _write, OwnSyntax(_recognizes, _read))
+KITTI_CAMERAS_FILE = OwnSyntax(_recognizes, _read)

@@ -1,54 +1,16 @@
 """MATLAB's cameraParameters and cameraIntrinsics as structs (toStruct) in a mat file; their pixels count from 1."""
 
-import io
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax
+from calib_core.interchange.cameras.camera_format import FoundCamera, OwnSyntax
 from calib_core.interchange.syntax.mat_file import load_mat
 
 ONE_BASED = 1.0
-_MAT_TEXT_BYTES = 116
 _MAT_5, _MAT_7_3 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
-
-
-def dated_nothing(content: bytes, title: str) -> bytes:
-    """Return a mat file with a title in place of the date that SciPy writes into it."""
-    return f"MATLAB 5.0 MAT-file, {title}".ljust(_MAT_TEXT_BYTES).encode()[:_MAT_TEXT_BYTES] + content[_MAT_TEXT_BYTES:]
-
-
-def _write(camera: Camera, _name: str) -> bytes:
-    from scipy.io import savemat
-
-    padded = [*camera.distortion.tolist(), *[0.0] * 8]
-    k1, k2, p1, p2, k3 = padded[:5]
-    if (
-        not camera.lens.is_perspective
-        or any(padded[5:])
-        or camera.model not in ("pinhole", "plumb_bob", "rational_polynomial")
-    ):
-        raise InputError(
-            f"MATLAB's cameraParameters have no {camera.model} lens with these coefficients; write ros, opencv or json"
-        )
-    shifted = camera.matrix_px.copy()
-    shifted[:2, 2] += ONE_BASED
-    parameters: dict[str, Any] = {
-        "RadialDistortion": np.array([[k1, k2, k3]]),
-        "TangentialDistortion": np.array([[p1, p2]]),
-        "ImageSize": np.array([[float(camera.height_px), float(camera.width_px)]]),
-        "FocalLength": np.array([[shifted[0, 0], shifted[1, 1]]]),
-        "PrincipalPoint": shifted[None, :2, 2],
-        "Skew": float(shifted[0, 1]),
-        "IntrinsicMatrix": shifted.T,
-        "K": shifted,
-    }
-    buffer = io.BytesIO()
-    savemat(buffer, {"cameraParams": parameters}, long_field_names=True, oned_as="row")  # type: ignore[arg-type]
-    return dated_nothing(buffer.getvalue(), "cocalib, cameraParams as toStruct makes it")
 
 
 def _recognizes(content: str | bytes) -> bool:
@@ -120,6 +82,4 @@ def _row(values: Mapping[str, Any], key: str) -> list[float]:
         return []
 
 
-MATLAB_PARAMETERS = CameraFormat(
-    "matlab", "MATLAB cameraParameters (mat)", ".mat", _write, OwnSyntax(_recognizes, _read)
-)
+MATLAB_PARAMETERS = OwnSyntax(_recognizes, _read)

@@ -4,40 +4,14 @@ import ast
 from collections.abc import Mapping
 from typing import Any
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, FoundCamera, OwnSyntax, refuse_skew
+from calib_core.interchange.cameras.camera_format import FoundCamera, OwnSyntax
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.parsing import python_tree
 
 _COEFFICIENTS = {"LENSMODEL_PINHOLE": 0, "LENSMODEL_OPENCV4": 4, "LENSMODEL_OPENCV5": 5, "LENSMODEL_OPENCV8": 8}
 _MODELS = {0: "pinhole", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
 _SOLVABLE = "calibrate with LENSMODEL_OPENCV8, or convert it with mrcal-convert-lensmodel"
-
-
-def _write(camera: Camera, _name: str) -> str:
-    refuse_skew(camera, "mrcal's models have")
-    if not camera.lens.is_perspective:
-        raise InputError(
-            f"mrcal has no name for the lens model {camera.model}; write ros, kalibr, opencv, colmap or json"
-        )
-    count = next((count for count in (0, 4, 5, 8) if not any(camera.distortion[count:].tolist())), None)
-    if count is None or camera.model not in (*_MODELS.values(),):
-        raise InputError(f"mrcal has no name for the lens model {camera.model}; write json")
-    name = next(name for name, known in _COEFFICIENTS.items() if known == count)
-    k = camera.matrix_px
-    padded = [*camera.distortion.tolist(), *[0.0] * 8][:count]
-    numbers = numbers_text((k[0, 0], k[1, 1], k[0, 2], k[1, 2], *padded))
-    return (
-        "{\n"
-        f"    'lensmodel':  '{name}',\n\n"
-        "    # fx,fy,cx,cy and the coefficients in OpenCV's order\n"
-        f"    'intrinsics': [ {numbers} ],\n\n"
-        "    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n\n"
-        f"    'imagersize': [ {camera.width_px}, {camera.height_px} ]\n"
-        "}\n"
-    )
 
 
 def _recognizes(content: str | bytes) -> bool:
@@ -72,4 +46,4 @@ def _dictionary(text: str, *, source: str) -> Mapping[str, Any]:
     return values
 
 
-MRCAL = CameraFormat("mrcal", "mrcal cameramodel", ".cameramodel", _write, OwnSyntax(_recognizes, _read), HASH_TAG)
+MRCAL = OwnSyntax(_recognizes, _read)

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
-from calib_core.interchange.cameras.matlab import ONE_BASED, dated_nothing
+from calib_core.interchange.cameras.matlab import ONE_BASED
 from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.named_arrays import from_arrays
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.statement import STATEMENT_KEY, statement
 from calib_core.interchange.syntax.content import Content
 
+_TEXT_BYTES = 116
 _NOTES = (
     "in MATLAB: load radar_camera.mat; tform = rigidtform3d(camera_from_radar.A); intrinsics = "
     "cameraIntrinsicsFromOpenCV(camera.K, camera.Distortion, camera.ImageSize), which counts pixels from 0 as camera.K does; "
@@ -53,7 +54,8 @@ def _write(file: CalibrationFile) -> bytes:
     content[STATEMENT_KEY] = "\n".join(statement(file, meaning))
     buffer = io.BytesIO()
     savemat(buffer, content, long_field_names=True, oned_as="row")  # type: ignore[arg-type]
-    return dated_nothing(buffer.getvalue(), f"cocalib, {EQUATION}")
+    dated = buffer.getvalue()  # begins with a date, which would make every file another
+    return f"MATLAB 5.0 MAT-file, cocalib, {EQUATION}".ljust(_TEXT_BYTES).encode()[:_TEXT_BYTES] + dated[_TEXT_BYTES:]
 
 
 def _recognizes(content: Content) -> bool:

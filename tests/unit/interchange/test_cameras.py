@@ -2,7 +2,6 @@
 
 import io
 import json
-import re
 
 import cv2
 import numpy as np
@@ -261,9 +260,6 @@ def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_imag
 
 
 WITHOUT = {  # lens models that a format has no name for
-    "mrcal": {"equidistant"},
-    "kitti": {"equidistant", "rational_polynomial"},
-    "matlab": {"equidistant", "rational_polynomial"},
     "kalibr": {"rational_polynomial"},
 }
 
@@ -316,17 +312,18 @@ def test_opencv_reads_its_own_formats(to, tmp_path):
     storage.release()
 
 
-def test_scipy_reads_matlabs_with_its_first_pixel_at_one():
-    from scipy.io import loadmat
+def test_matlabs_parameters_are_read_with_their_first_pixel_at_one():
+    from scipy.io import savemat
 
     camera = typical_camera("plumb_bob")
-    content = camera_content(camera, "matlab")
-    assert isinstance(content, bytes)
-    found = loadmat(io.BytesIO(content), simplify_cells=True)["cameraParams"]
-    np.testing.assert_allclose(found["PrincipalPoint"], camera.matrix_px[:2, 2] + 1.0)
-    np.testing.assert_allclose(found["IntrinsicMatrix"].T[:2, :2], camera.matrix_px[:2, :2])
-    np.testing.assert_array_equal(found["ImageSize"], [camera.height_px, camera.width_px])
-    np.testing.assert_array_equal(found["TangentialDistortion"], camera.distortion[2:4])
+    k1, k2, p1, p2, k3 = camera.distortion
+    matrix = camera.matrix_px + np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+    struct = {"RadialDistortion": [k1, k2, k3], "TangentialDistortion": [p1, p2], "IntrinsicMatrix": matrix.T}
+    buffer = io.BytesIO()
+    savemat(buffer, {"cameraParams": struct | {"ImageSize": [float(camera.height_px), float(camera.width_px)]}})
+    again = read_back(buffer.getvalue())
+    np.testing.assert_allclose(again.parameters, camera.parameters)
+    assert (again.width_px, again.height_px) == (camera.width_px, camera.height_px)
 
 
 def test_a_plain_yaml_reader_reads_kalibrs_and_ros():
@@ -339,23 +336,26 @@ def test_a_plain_yaml_reader_reads_kalibrs_and_ros():
     np.testing.assert_array_equal(ros["distortion_coefficients"]["data"], camera.distortion)
 
 
-def test_the_lines_of_colmap_and_kitti_say_what_their_documentation_says():
+def test_mrcals_model_is_read():
+    assert read_back(MODEL).distortion.tolist() == [0.1, 0, 0, 0]
+
+
+def test_the_line_of_colmap_says_what_its_documentation_says():
     camera = typical_camera("plumb_bob")
     line = str(camera_content(camera, "colmap")).splitlines()[-1].split()
     assert line[1] == "FULL_OPENCV" if camera.distortion[4] else "OPENCV"
     assert float(line[6]) == camera.matrix_px[0, 2] + 0.5
-    keyed = dict(row.split(": ") for row in str(camera_content(camera, "kitti")).splitlines())
-    np.testing.assert_array_equal(np.array(keyed["K_00"].split(), dtype=float), camera.matrix_px.ravel())
-    np.testing.assert_array_equal(np.array(keyed["D_00"].split(), dtype=float), camera.distortion)
 
 
-def test_mrcals_dictionary_names_model_and_size():
-    text = str(camera_content(typical_camera("rational_polynomial"), "mrcal"))
-    assert "'LENSMODEL_OPENCV8'" in text
-    numbers = re.search(r"'intrinsics': \[ (.*) \]", text)
-    np.testing.assert_array_equal(
-        [float(number) for number in numbers[1].split(",")], typical_camera("rational_polynomial").parameters
-    )
+def test_kittis_cameras_are_read_with_their_lens_and_rectified():
+    camera = typical_camera("plumb_bob")
+    rows = {
+        "S_00": [camera.width_px, camera.height_px], "K_00": camera.matrix_px.ravel(), "D_00": camera.distortion,
+        "S_rect_00": [600, 400], "P_rect_00": [*range(500, 504), *range(504, 508), 0, 0, 1, 0],
+    }  # fmt: skip
+    text = "calib_time: 1\n" + "".join(f"{key}: {' '.join(map(repr, map(float, row)))}\n" for key, row in rows.items())
+    np.testing.assert_array_equal(CameraFile("camera", text.encode(), "00").camera().parameters, camera.parameters)
+    assert CameraFile("camera", text.encode(), "rect_00").camera().width_px == 600
 
 
 @pytest.mark.parametrize("to", ["ros", "json"])
