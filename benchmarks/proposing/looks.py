@@ -19,14 +19,14 @@ from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import Facet, subdivided
 from calib_core.synthetic.scene.person import Capsule
 
-__all__ = ["LOOKS", "draw_with_look"]
+__all__ = ["LOOKS", "Look", "draw_with_look", "sheet"]
 
 _WHITE, _BLACK, _STEEL = (np.full(3, level, dtype=np.float32) for level in (0.9, 0.02, 0.5))
 _BINS = (0.5, 0.7, 0.8, 0.9)
 Facets: TypeAlias = Callable[[Vector3, float], list[Facet]]
 
 
-def _sheet(
+def sheet(
     apex_m: Vector3, facing_rad: float, colour: np.ndarray, *, half_m: float, low_m: float, high_m: float
 ) -> Facet:
     """Return an upright rectangle that faces the sensors, from one height above the apex to another."""
@@ -38,16 +38,16 @@ def _sheet(
 def _board(apex_m: Vector3, facing_rad: float) -> list[Facet]:
     """Return a white board of 0.36 m with a dark opening in which the sheets are."""
     return [
-        _sheet(apex_m, facing_rad, _WHITE, half_m=0.18, low_m=-0.13, high_m=0.23),
-        _sheet(apex_m, facing_rad, _BLACK, half_m=0.07, low_m=-0.07, high_m=0.07),
-        _sheet(apex_m, facing_rad, _STEEL, half_m=0.04, low_m=-0.06, high_m=0.0),
+        sheet(apex_m, facing_rad, _WHITE, half_m=0.18, low_m=-0.13, high_m=0.23),
+        sheet(apex_m, facing_rad, _BLACK, half_m=0.07, low_m=-0.07, high_m=0.07),
+        sheet(apex_m, facing_rad, _STEEL, half_m=0.04, low_m=-0.06, high_m=0.0),
     ]
 
 
 def _metal(apex_m: Vector3, facing_rad: float) -> list[Facet]:
     """Return a bare sheet of 0.24 m that mirrors the ground below and the sky above."""
     return [
-        _sheet(apex_m, facing_rad, (0.4 + 2.5 * high_m) * _STEEL, half_m=0.12, low_m=high_m - 0.04, high_m=high_m)
+        sheet(apex_m, facing_rad, (0.4 + 2.5 * high_m) * _STEEL, half_m=0.12, low_m=high_m - 0.04, high_m=high_m)
         for high_m in (-0.08, -0.04, 0.0, 0.04, 0.08, 0.12)
     ]
 
@@ -55,9 +55,9 @@ def _metal(apex_m: Vector3, facing_rad: float) -> list[Facet]:
 def _tube(apex_m: Vector3, facing_rad: float) -> list[Facet]:
     """Return a light tube from the ground up, with a dark box of 0.2 m on it."""
     return [
-        _sheet(apex_m, facing_rad, _WHITE, half_m=0.025, low_m=-float(apex_m[2]), high_m=0.0),
-        _sheet(apex_m, facing_rad, _BLACK, half_m=0.1, low_m=-0.1, high_m=0.1),
-        _sheet(apex_m, facing_rad, _STEEL, half_m=0.05, low_m=-0.08, high_m=0.08),
+        sheet(apex_m, facing_rad, _WHITE, half_m=0.025, low_m=-float(apex_m[2]), high_m=0.0),
+        sheet(apex_m, facing_rad, _BLACK, half_m=0.1, low_m=-0.1, high_m=0.1),
+        sheet(apex_m, facing_rad, _STEEL, half_m=0.05, low_m=-0.08, high_m=0.08),
     ]
 
 
@@ -69,7 +69,7 @@ LOOKS: dict[str, Facets] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Renderer(FrameRenderer):
+class Look(FrameRenderer):
     """Draws other facets in place of the reflector's."""
 
     facets: Facets = _board
@@ -84,7 +84,7 @@ class _Renderer(FrameRenderer):
 
 def draw_with_look(seed: int, look: str) -> Drawn:
     """Simulate the small case of a seed with a reflector of another look."""
-    return draw_small(seed, partial(_Renderer, facets=LOOKS[look]))
+    return draw_small(seed, partial(Look, facets=LOOKS[look]))
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.still import Still, pixel_rays
 
-__all__ = ["draw_small", "small_case"]
+__all__ = ["draw_small", "quick_frames", "small_case"]
 
 _SIZE_PX = (480, 270)
 _PLACEMENTS = 4
@@ -45,7 +45,12 @@ def draw_small(seed: int, renderer: Callable[..., FrameRenderer] = FrameRenderer
     """Simulate a small case; nothing is kept on the disk."""
     case = small_case(seed)
     recording = simulate(case.options)
-    return drawn_from(recording, case, None, _Remembered(SimulatedImages(recording, _rendered_by(renderer, recording))))
+    return drawn_from(recording, case, None, quick_frames(recording, renderer))
+
+
+def quick_frames(recording: SimulatedRecording, renderer: Callable[..., FrameRenderer] = FrameRenderer) -> FrameSource:
+    """Return the frames of a recording before a backdrop that is not traced, each rendered once."""
+    return _Remembered(SimulatedImages(recording, _rendered_by(renderer, recording)))
 
 
 class _Remembered:

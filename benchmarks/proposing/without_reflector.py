@@ -22,7 +22,7 @@ from calib_core.synthetic.options import SimulationOptions, Surroundings, Traffi
 from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.scene.story import Moment, Story
 
-__all__ = ["drive_of", "measure_drive", "measure_real", "real_recordings"]
+__all__ = ["drive_of", "measure_drive", "measure_real", "real_recordings", "without_reflector"]
 
 _PARKED = Surroundings(parked_cars=4, fence=True, strong_target_dbsm=29.0)
 _SWAYING = Surroundings(flickering_targets=20)
@@ -59,14 +59,15 @@ def measure_drive(folder: Path, seed: int) -> Figures:
     """Draw a drive and measure it; no figures if its traffic does not fit into the scene."""
     case = drive_of(seed)
     try:
-        recording = _without_reflector(simulate(case.options))
+        recording = without_reflector(simulate(case.options))
     except OptionError:
         return {}
     drawn = drawn_from(recording, case, folder / "drives")
     return _measured(drawn.placements, drawn.frames, drawn.recording.camera)
 
 
-def _without_reflector(recording: SimulatedRecording) -> SimulatedRecording:
+def without_reflector(recording: SimulatedRecording) -> SimulatedRecording:
+    """Return a recording in which the person carries nothing."""
     story = recording.stage.story
     empty_handed = EmptyHanded(*(getattr(story, field.name) for field in fields(story)))
     return replace(recording, stage=replace(recording.stage, story=empty_handed))

@@ -52,6 +52,7 @@ class Dwell:
         presence: share of its scans that show it.
         presence_outside: share of the other scans that show the same place.
         snr_db: mean of its returns; NaN when unknown.
+        fading_db: standard deviation of the strongest in each scan; NaN when unknown.
         strength_db: SNR corrected for range, a measure of the radar cross-section; 0 if unknown.
         reach: (3,) of its returns about their median in range [m], u and w.
         begins: the scans show that it was not there before its start.
@@ -67,6 +68,7 @@ class Dwell:
     presence: float
     presence_outside: float
     snr_db: float
+    fading_db: float
     strength_db: float
     reach: Vector3
     begins: bool
@@ -97,6 +99,7 @@ class Placement:
         position_radar_m: (3,) median of its returns.
         score: 0 to 1: product of its presence, its novelty and its strength among the placements.
         snr_db: mean of its returns; NaN if the radar reports none.
+        fading_db: standard deviation of its echo: small of one surface, 5.6 of many that move (Rayleigh); NaN if unknown.
     """
 
     start: TimeNs
@@ -104,6 +107,7 @@ class Placement:
     position_radar_m: Vector3
     score: float
     snr_db: float = float("nan")
+    fading_db: float = float("nan")
 
     def __post_init__(self) -> None:
         freeze(self, position_radar_m=(3,))
@@ -255,6 +259,7 @@ def _placement(dwell: Dwell, typical_db: float) -> Placement:
         position_radar_m=dwell.position_radar_m,
         score=dwell.presence * novelty * strength,
         snr_db=dwell.snr_db,
+        fading_db=dwell.fading_db,
     )
 
 
@@ -481,6 +486,7 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         presence=presence,
         presence_outside=presence_outside,
         snr_db=mean_db,
+        fading_db=_fading_db(grid.scan[mine], snr_db),
         strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
         reach=grid.reach,
         begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
@@ -489,6 +495,18 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         listed_first=float(grid.listed_first[mine].mean()),
         first_listed_radar_m=np.median(first_listed, axis=0) if len(keys) else position_radar_m,
     )
+
+
+def _fading_db(scan: Indices, snr_db: Values) -> float:
+    """Return how far the strongest echo of each scan scatters; a radar may measure in two ways in turn, each of its own level."""
+    known = np.isfinite(snr_db)
+    scans, row = np.unique(scan[known], return_inverse=True)
+    if len(scans) < _FEW:
+        return float("nan")
+    strongest_db = np.full(len(scans), -np.inf)
+    np.maximum.at(strongest_db, row, snr_db[known])
+    in_turn = [strongest_db[scans % 2 == way] for way in (0, 1)]
+    return float(np.sqrt(sum(len(own) * own.var() for own in in_turn if len(own)) / len(scans)))
 
 
 def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:

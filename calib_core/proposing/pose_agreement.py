@@ -581,24 +581,31 @@ _BEFORE = 1.0
 _LEAST_SEEN = 3
 """Fewer places that tell say nothing."""
 
+_STEADY_DB, _RAYLEIGH_DB, _FADING_SPREAD = 1.0, 5.57, 0.5
+"""How far the echo of one surface scatters, by the receiver's noise, and that of many which move (Rayleigh's distribution of
+amplitudes, in decibels); and the standard deviation of the logarithm of both."""
+
 _PRESENT = 0.5
 
 
 def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement, *, by_shape: bool = False) -> float:
     """Return the log-odds that what stood there is a reflector and not a person; infinite where too little is told.
 
-    A place that is wide enough to show an apex and shows none speaks against it, unless the thing is not upright, as a board
-    around small sheets.
+    An echo that fades speaks against it, and a place that is wide enough to show an apex and shows none, unless the thing is not
+    upright, as a board around small sheets.
 
     Args:
         views: as the agreement was found for, without confirmed clicks.
         agreement: its most probable candidates are looked at.
         by_shape: whether what is too small for an apex is told by its shape alone: a reflector on a tripod is upright, too.
     """
-    log_odds, count = _BEFORE, 0
+    log_odds, count, fading_db = 0.0, 0, []
     for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
         wide = view.width_px >= _WIDE_ENOUGH_PX
-        if probability[row] < _PRESENT or not (wide or by_shape):
+        if probability[row] < _PRESENT:
+            continue
+        fading_db.append(view.placement.fading_db)
+        if not (wide or by_shape):
             continue
         candidate = view.candidates[row]
         upright = None if candidate.has_apex else is_upright(view, candidate.pixel_px)
@@ -609,4 +616,15 @@ def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement, *, 
         if upright is False or (upright and not wide):
             log_odds += float(np.log(_UPRIGHT_PERSON / _UPRIGHT_REFLECTOR)) * (-1.0 if upright else 1.0)
         count += wide or upright is not None
-    return log_odds if count >= _LEAST_SEEN else float("inf")
+    known_db = np.array(fading_db)[np.isfinite(fading_db)]
+    if max(count, len(known_db)) < _LEAST_SEEN:
+        return float("inf")
+    by_echo = _steadiness(float(np.median(known_db))) if len(known_db) >= _LEAST_SEEN else 0.0
+    return _BEFORE + by_echo + (log_odds if count >= _LEAST_SEEN else 0.0)
+
+
+def _steadiness(fading_db: float) -> float:
+    """Return the log-odds that an echo which scatters so far is of one surface."""
+    steady, faded = np.log([_STEADY_DB, _RAYLEIGH_DB])
+    off = float(np.clip(np.log(max(fading_db, 1e-3)), steady, faded))
+    return float((faded - off) ** 2 - (steady - off) ** 2) / (2.0 * _FADING_SPREAD**2)

@@ -43,7 +43,9 @@ _NO_FRAME = "no camera frame of it"
 _NO_CHANGE = "no change of the reflector's size"
 _NO_POSE = "image and radar agree on no pose yet; click the first two placements yourself"
 _OPEN = "more clicks will help"
-_NO_APEX = "no inner corner seen; if it is the reflector, click the first two placements yourself"
+_A_PERSON = (
+    "it may be a person: no inner corner, or a fading echo; if it is the reflector, click two placements yourself"
+)
 _ELSEWHERE = "no change where the other placements expect it"
 _TWO_PLACES = "two spots are about as likely"
 _TAKEN = "the only likely spot is another reflector's"
@@ -203,7 +205,7 @@ class _Judged:
         if self.weaker_db[i] > _WEAK_ECHO_DB:
             return f"its echo is {self.weaker_db[i]:.0f} dB weaker than the others': probably not the reflector"
         if self.reflectors < _MORE_LIKELY:
-            return _NO_APEX
+            return _A_PERSON
         if self.agreement is None or self.trusted < _MORE_LIKELY:
             return self._without_pose()
         if self.agreement.off_sigma[i][odds > 0.0].min(initial=np.inf) > _FAR_SIGMA:

@@ -87,6 +87,7 @@ def test_a_dwell_is_found_with_its_times_and_its_place():
     assert placement.end / NS_PER_S == pytest.approx(27.0, abs=0.5)
     np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.01)
     assert placement.snr_db == pytest.approx(25.0, abs=0.5)
+    assert placement.fading_db == pytest.approx(1.0, abs=0.3)
 
 
 def test_what_is_always_there_is_clutter():
@@ -252,6 +253,17 @@ def test_moving_returns_and_returns_without_position_are_ignored():
     assert find_placements(nowhere, GatingOptions()) == ()
 
 
+def test_two_levels_in_turn_are_no_fading_and_rayleighs_are():
+    scans = scans_with([(10.0, 30.0, REFLECTOR, 25.0)])
+    scan = scans.scan_of_return()
+    amplitudes = np.random.default_rng(1).rayleigh(size=len(scans))
+    for level_db, least, most in ((8.0 * (scan % 2), 0.7, 1.3), (20.0 * np.log10(amplitudes[scan]), 4.5, 7.0)):
+        columns = {name: getattr(scans, name) for name in ("times_ns", "first_return", "doppler_mps", "sigma_polar")}
+        levelled = RadarScans(**columns, points_radar_m=scans.points_radar_m, snr_db=scans.snr_db + level_db)
+        (placement,) = find_placements(levelled, GatingOptions())
+        assert least < placement.fading_db < most
+
+
 def test_a_radar_without_snr_and_doppler_still_shows_placements():
     scans = scans_with([(20.0, 27.0, REFLECTOR, float("nan"))])
     silent = RadarScans(
@@ -264,6 +276,7 @@ def test_a_radar_without_snr_and_doppler_still_shows_placements():
     )
     (placement,) = find_placements(silent, GatingOptions())
     assert np.isnan(placement.snr_db)
+    assert np.isnan(placement.fading_db)
     assert placement.score > 0.5
 
 

@@ -317,6 +317,16 @@ def test_a_person_who_stands_at_every_placement_is_refused_and_not_proposed():
     assert drawn.views[0].image_time not in {click.image_time for click in with_a_click.clicks}
 
 
+@pytest.mark.parametrize(("fading_db", "is_reflector"), [(1.0, True), (1.8, True), (3.6, False)])
+def test_an_echo_that_fades_is_a_persons_until_somebody_clicks(fading_db, is_reflector):
+    drawn = draw_views(1, Drawing(count=6))
+    views = [replace(view, placement=replace(view.placement, fading_db=fading_db)) for view in drawn.views]
+    found = proposals_of(views, CAMERA, OPTIONS)
+    assert (found.reflectors > 0.5) == is_reflector
+    assert bool(found.ranked) == is_reflector
+    assert proposals_of(views, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked
+
+
 def _with_upright_thing(view: DwellView, pixel_px: np.ndarray) -> DwellView:
     """Return a view in which a thing of 24 by 80 pixels changed."""
     change = np.zeros((1, CAMERA.height_px // 8, CAMERA.width_px // 8), np.uint8)
