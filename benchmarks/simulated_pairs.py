@@ -33,6 +33,8 @@ class SystematicErrors:
     """Reported azimuth over the true one, minus 1."""
     elevation_scale: float = 0.0
     """The same of the elevation."""
+    elevation_lean: float = 0.0
+    """Reported elevation minus the true one, over the azimuth: a rolled or sheared array."""
     azimuth_bias_deg: float = 0.0
     """Reported azimuth minus the true one [deg]; it turns the reported axes, and the true pose is that of these axes."""
     elevation_bias_deg: float = 0.0
@@ -67,7 +69,9 @@ class SystematicErrors:
         """Return the range [m], azimuth and elevation [rad] (n, 3) that the radar reports for true positions (n, 3)."""
         scale = np.array([self.range_scale, self.azimuth_scale, self.elevation_scale])
         bias = np.array([self.range_bias_m, *np.deg2rad([self.azimuth_bias_deg, self.elevation_bias_deg])])
-        return polar_from_cartesian(points_radar_m) * (1.0 + scale) + bias
+        polar = polar_from_cartesian(points_radar_m)
+        bias = bias + self.elevation_lean * np.outer(polar[:, 1], [0.0, 0.0, 1.0])
+        return polar * (1.0 + scale) + bias
 
     def without_elevation(self, points_radar_m: Points3) -> Points3:
         """Return positions (n, 3) as reported: a radar that measures no elevation keeps range and azimuth only."""
@@ -124,6 +128,7 @@ def draw_systematic_errors(
         distortion=lens.distortion_sigma * drawn[12],
         azimuth_bias_deg=angle_biases * radar.azimuth_bias_sigma_deg * drawn[13],
         elevation_bias_deg=angle_biases * radar.elevation_bias_sigma_deg * drawn[14],
+        elevation_lean=radar.elevation_lean_sigma * float(rng.spawn(1)[0].standard_normal()),
     )
 
 

@@ -30,7 +30,6 @@ from calib_core.results.systematic_errors import scaled_angles
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
-_NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbors come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers")
@@ -141,7 +140,7 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
 
 def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
     uncertainty = fit.uncertainty
-    if not uncertainty.shows_smooth or uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
+    if not uncertainty.shows_smooth or fit.measurements.flat:
         return []
     uncertain_lens = fit.measurements.camera.covariance is not None and not fit.options.refining.intrinsics
     return [DataWarning("smooth-angle-errors", {"growth": fit.uncertainty.growth, "uncertain_lens": uncertain_lens})]

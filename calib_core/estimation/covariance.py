@@ -8,8 +8,9 @@ direction, so that the whitened residuals of all pairs together have the covaria
 
     V = tau^2 I + rho^2 B B^T,   B B^T = sum over azimuth and elevation of G K G^T,                       (3)
 
-with G = W d pixel / d angle in sigmas and K(x, x') = exp(-|x - x'|^2 / 2 l^2). The restricted marginal likelihood
-of the residuals gives the probability of each level and length. The least-squares estimate is unchanged; its covariance
+with G = W d pixel / d angle in sigmas and K(x, x') = exp(-|x - x'|^2 / 2 l^2). How much of the stated variance is smooth no
+residual can tell, since the pose absorbs it, so rho^2 is a prior; the restricted marginal likelihood of the residuals gives the
+probability of each tau and length. The least-squares estimate is unchanged; its covariance
 becomes H^-1 (J^T V J) H^-1.
 """
 
@@ -330,14 +331,14 @@ def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
     return float(CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - CHI2_95_6))
 
 
-_LENGTHS_RAD = (np.deg2rad(8.0), np.deg2rad(14.0), np.deg2rad(25.0))
-_INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
-_SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
-_MOST_CENTRES = 40
+_LENGTHS_RAD = (np.deg2rad(10.0), np.deg2rad(18.0), np.deg2rad(32.0))
+_SMOOTH_SHARE = 0.8  # of an angle's variance: a radar's stated accuracy is mostly that of its array's calibration
+_INDEPENDENT = (1.0, 0.6, 0.35, 0.15)  # variance of the rest beside it, over the estimated one
+_SMOOTH_PROBABILITY = 0.8  # before any residual, spread evenly over lengths and variances of the rest
+_SHOWN = 0.95  # probability of smooth errors from which the residuals show them
+_MOST_CENTERS = 40
 _LEAST_PAIRS = 7.0
-_INDEPENDENT_LOG_ODDS = 3.0
-"""Prior log-odds of independent errors against each single split: sets with partly smooth errors are then covered too."""
-_SHOWN = 0.3  # probability of smooth errors from which residuals show them
+_MOST_LOG_RATIO = 500.0  # exp() of more is beyond all numbers
 _NEGLIGIBLE = 1e-10
 
 
@@ -357,21 +358,20 @@ def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tup
     inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's down-weighted residual would look like a perfect one
     residual, jacobian = weighted_rows(refined, inliers)
     prior = prior_rows(refined.measurements, refined.camera_from_radar)
-    levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
-    nothing = np.zeros((len(residual), 0))
-    likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _INDEPENDENT_LOG_ODDS]
-    middles = [(jacobian.T @ jacobian)[None]]
+    levels = [(independent, _SMOOTH_SHARE) for independent in _INDEPENDENT]
+    own = jacobian.T @ jacobian
+    likelihoods, middles = [], [own]
     for length_rad in _LENGTHS_RAD:
         shape = smooth_rows(refined, inliers, length_rad)
         shared = shape.T @ jacobian
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
-        parts = np.array(levels)[:, :, None, None]
-        middles.append(parts[:, 0] * (jacobian.T @ jacobian) + parts[:, 1] * (shared.T @ shared))
-    probability = np.exp(np.concatenate(likelihoods) - np.concatenate(likelihoods).max())
-    probability /= probability.sum()
-    middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
+        middles += [part * own + share * (shared.T @ shared) for part, share in levels]
+    independent = _log_likelihoods(residual, jacobian, prior, np.zeros((len(residual), 0)), [(1.0, 0.0)])
+    ratios = np.exp(np.minimum(np.concatenate(likelihoods) - independent, _MOST_LOG_RATIO))
+    weights = np.concatenate([[1.0 - _SMOOTH_PROBABILITY], _SMOOTH_PROBABILITY * ratios / len(ratios)])
+    middle = np.tensordot(weights / weights.sum(), np.array(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
-    return np.asarray(inverse @ middle @ inverse), bool(probability[0] < 1.0 - _SHOWN)
+    return np.asarray(inverse @ middle @ inverse), bool(weights[0] < (1.0 - _SHOWN) * weights.sum())
 
 
 def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Values, np.ndarray]:
@@ -382,14 +382,20 @@ def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Valu
 
 
 def smooth_rows(refined: ErrorsInVariablesFit, inliers: Indices, length_rad: float) -> np.ndarray:
-    """Return B (2 n, 2 k) of the inliers, with the kernel's square root taken on at most _MOST_CENTRES directions (Nystrom)."""
+    """Return B (2 n, 2 k) of the inliers, with the kernel's square root taken on at most _MOST_CENTERS directions (Nystrom).
+
+    Its size is that of the stated sigmas, or of the estimated ones where these are larger: a fit to smooth errors absorbs most of
+    them, so that the rest seems quieter than stated, down to the share of the variance that is not smooth.
+    """
     directions = _directions(refined, inliers)
-    chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTRES)).round().astype(np.int64)
-    centres = directions[chosen]
-    values, vectors = np.linalg.eigh(_kernel(centres, centres, length_rad))
+    chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTERS)).round().astype(np.int64)
+    centers = directions[chosen]
+    values, vectors = np.linalg.eigh(_kernel(centers, centers, length_rad))
     kept = values > 1e-6 * values[-1]
-    features = _kernel(directions, centres, length_rad) @ (vectors[:, kept] / np.sqrt(values[kept]))
-    sigma = refined.measurements.sigma_polar[refined.rows[inliers]] * np.sqrt(refined.weights[inliers])[:, None]
+    features = _kernel(directions, centers, length_rad) @ (vectors[:, kept] / np.sqrt(values[kept]))
+    absorbed = np.clip(refined.noise_scale[1:], (1.0 - _SMOOTH_SHARE) ** 0.5, 1.0)
+    sigma = refined.measurements.sigma_polar[refined.rows[inliers]] / absorbed
+    sigma = sigma * np.sqrt(refined.weights[inliers])[:, None]
     parts = []
     for angle in (1, 2):
         gain = refined.model.point_jacobian[inliers, :, angle] * sigma[:, None, angle]  # G, (n, 2)

@@ -274,6 +274,7 @@ def test_errors_are_as_large_as_the_options_state():
     stated = {
         "azimuth_scale": radar.azimuth_scale_sigma,
         "elevation_scale": radar.elevation_scale_sigma,
+        "elevation_lean": radar.elevation_lean_sigma,
         "range_bias_m": radar.range_bias_sigma_m,
         "range_scale": radar.range_scale_sigma,
         "click_offset_px": reflector.click_offset_sigma_px,
