@@ -19,6 +19,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of, heads_from, keep_heads
+from calib_core.recordings.containers.message_files import definition_beside
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex, StoredChannel
 
@@ -387,7 +388,9 @@ class SqliteSource:
         channels = []
         for number, topic, kind, encoding in self._rows("SELECT id, name, type, serialization_format FROM topics"):
             form, text = definitions.get(kind, ("", ""))
-            form = form if text.strip() else ""
+            if not text.strip():
+                text = definition_beside(self.path.parent, str(kind))
+                form = "msg" if text else ""
             channels.append(Channel(number, str(topic), str(kind), str(encoding), text, form))
         return tuple(channels)
 

@@ -173,7 +173,8 @@ def definition_of(channel: Channel) -> Definition:
         if name not in KNOWN_DEFINITIONS:
             raise MessageError(
                 f"topic {channel.topic}: the recording has no definition of {channel.type}, and the type is unknown; "
-                "convert the recording where that package is installed (ros2 bag convert to mcap writes definitions)"
+                f"beside a .db3 put its package's files as {name.replace('/', '/msg/')}.msg, or convert the recording where "
+                "that package is installed (ros2 bag convert to mcap writes definitions)"
             )
         text, form = KNOWN_DEFINITIONS[name], "msg"
     try:
@@ -317,9 +318,11 @@ def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Fi
 
 
 def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:
-    """Refuse types that contain themselves and implausibly long arrays."""
+    """Refuse types that contain themselves or two fields of one name, and implausibly long arrays."""
     if name in above or len(above) > 32:
         raise MessageError(f"the definition of {definition.type} contains itself at {name}")
+    if len({one.name for one in definition.types[name]}) < len(definition.types[name]):
+        raise MessageError(f"the definition of {name} has two fields of one name; it is damaged")
     for one in definition.types[name]:
         if (one.count or 0) > _MAX_FIXED:
             raise MessageError(

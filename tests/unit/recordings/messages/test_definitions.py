@@ -95,6 +95,7 @@ def test_code_in_a_definition_is_never_run(text, ros1, write, tmp_path, monkeypa
         ("float32 x y z\nno!", "a line that is not a field: 'no!'"),
         ("Unknown x", "uses test_msgs/Unknown, which is not defined in the recording"),
         ("Thing again", "contains itself"),
+        ("float32 x\nuint8 x", "has two fields of one name"),
         ("float64[99999999] x", "a fixed array of 99999999 elements; at most"),
         ("float32 x\n=====\nnonsense", "begins with 'nonsense' instead of MSG:"),
     ],

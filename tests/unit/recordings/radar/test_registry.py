@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.errors import MessageError, OptionError
+from calib_core.errors import MessageError, OptionError, RecordingError
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, open_recording
 from calib_core.recordings.containers.opening import open_sources
@@ -96,6 +96,25 @@ def test_types_that_ros_defines_are_read_from_bags_without_definitions(name, ros
     path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
     with open_recording(altered(path, "DROP TABLE message_definitions"), require=("radar",)) as recording:
         np.testing.assert_allclose(recording.radar_scans().points_radar_m, expected.points, rtol=1e-6, atol=1e-6)
+
+
+def test_files_of_a_package_beside_a_database_define_its_messages(ros2, write):
+    ros2.define("our_msgs/msg/Target", "float32 range\nfloat32 azimuth\nfloat32 doppler_velocity\n")
+    ros2.define("our_msgs/msg/Targets", "std_msgs/Header header\nour_msgs/Target[] targets\ngeometry_msgs/Point mount\n")
+    target = ros2.new("our_msgs/msg/Target", range=5.0, azimuth=0.1, doppler_velocity=0.0)
+    mount = ros2.new("geometry_msgs/msg/Point", x=0.0, y=0.0, z=0.0)
+    message = ros2.new("our_msgs/msg/Targets", header=ros2.header(START_NS), targets=[target] * 3, mount=mount)
+    path = altered(write(ros2, [("/radar", START_NS, message)], "db3"), "DROP TABLE message_definitions")
+    with pytest.raises(RecordingError, match=r"put its package's files as our_msgs/msg/Targets\.msg"):
+        open_recording(path, RecordingOptions(radar_topic="/radar"), require=("radar",))
+    folder = path.parent / "our_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Target.msg").write_text("float32 range  # [m]\nfloat32 azimuth  # deg\nfloat32 doppler_velocity\n")
+    (folder / "Targets.msg").write_text("std_msgs/Header header\nTarget[] targets\ngeometry_msgs/Point mount\n")
+    with open_recording(path, require=("radar",)) as recording:
+        angle = np.radians(0.1)
+        expected = [5 * np.cos(angle), 5 * np.sin(angle), 0.0]
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, [expected] * 3, rtol=1e-6)
 
 
 # -- contradictions
