@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -41,16 +42,22 @@ def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamer
     for matrix_key, distortion_keys in _MATRIX_KEYS.items():
         if matrix_key in content:
             return (_flat_camera(content, matrix_key, distortion_keys, source=source),)
-    if {"fx", "fy"} <= set(content):
-        return (_named_numbers(content, source=source),)
     if isinstance(content.get("CameraCalibration"), Mapping):
         return find_cameras(content["CameraCalibration"], source=source)
     if isinstance(content.get("sensors"), list):
         return tuple(_sensor_camera(row, source=source) for row in content["sensors"] if _has_matrix(row))
+    named = {"camera": content} if _names_focal_lengths(content) else content
+    blocks = [key for key, block in named.items() if _names_focal_lengths(block)]
+    if blocks:
+        return tuple(replace(_named_numbers(named[key], source=source), name=str(key)) for key in blocks)
     numbered = [match for key in content if (match := re.fullmatch(r"(?:M|K|cameraMatrix)(\d)", str(key)))]
     return tuple(
         _flat_camera(content, match[0], (f"D{match[1]}", f"distCoeffs{match[1]}"), source=source) for match in numbered
     )
+
+
+def _names_focal_lengths(block: Any) -> bool:
+    return isinstance(block, Mapping) and {"fx", "fy"} <= set(block)
 
 
 def _has_matrix(row: Any) -> bool:
@@ -107,7 +114,9 @@ def _named_numbers(content: Mapping[str, Any], *, source: str) -> FoundCamera:
     """Read fx, fy and the principal point under their own names, as cameras' software writes them."""
     centre = [next((content[key] for key in keys if key in content), None) for keys in (("cx", "ppx"), ("cy", "ppy"))]
     fx, fy, cx, cy = floats([content["fx"], content["fy"], *centre], source=source, place="fx, fy, cx (ppx), cy (ppy)")
-    given = next((content[key] for key in ("coeffs", "distortion", "D", "dist_coeffs") if key in content), None)
+    given = next(
+        (content[key] for key in ("coeffs", "distortion", "D", "dist_coeffs", "disto") if key in content), None
+    )
     if given is None:
         named = [content.get(key, 0.0) for key in ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")]
         given = named[: 8 if any(named[5:]) else 5] if "k1" in content else ()

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+import numpy as np
+
 from calib_core.arrays import Matrix33, Vector3, freeze
 from calib_core.interchange.format import Direction, looks_like_camera, looks_like_lidar, looks_like_radar
 
@@ -182,6 +184,11 @@ class PoseReading:
 
     def __post_init__(self) -> None:
         freeze(self, translation=(3,))
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether it moves nothing."""
+        return np.array_equal(self.turned.rotation, np.eye(3)) and not self.translation.any()
 
 
 @dataclass(frozen=True, slots=True)

@@ -215,7 +215,8 @@ def hypotheses_of(
 def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis | None:
     """Return the only hypothesis that is plausible; None if several are, or none.
 
-    Without a test it is also None if the pose seems to be another sensor's, or if its names state the other direction.
+    Without a test it is also None if the pose seems to be another sensor's, if its names state the other direction, or if it
+    is the identity, as a frame has in itself or nobody has filled in.
 
     Args:
         pose: the numbers.
@@ -224,7 +225,8 @@ def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis |
     first = hypotheses[0]
     tested = not (math.isnan(first.miss_px) and math.isnan(first.apart[0]))
     as_named = not pose.hints.other and not contradicts_names(pose, first)
-    return first if first.fits and first.share >= _CLEAR and (tested or as_named) else None
+    blank = all(reading.is_identity for reading in pose.readings)
+    return first if first.fits and first.share >= _CLEAR and (tested or (as_named and not blank)) else None
 
 
 def contradicts_names(pose: FoundPose, hypothesis: Hypothesis) -> bool:

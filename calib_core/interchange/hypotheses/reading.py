@@ -11,7 +11,14 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.check.pair_residuals import CheckPairs
-from calib_core.interchange.format import ImportedCalibration, WrittenPose, looks_like_lidar, of_lidar
+from calib_core.interchange.format import (
+    ImportedCalibration,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_lidar,
+    looks_like_radar,
+    of_lidar,
+)
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.opencv import OPENCV
@@ -80,12 +87,19 @@ class UnstatedFile:
         Raises:
             InputError: it has.
         """
-        camera = next((pose.place for pose in self.poses if pose.place in self.beside), place)
-        if place not in self.beside and camera != place:
+        cameras = [pose.place for pose in self.poses if pose.place in self.beside or _is_of_camera_alone(pose)]
+        between = any(pose.place == place and any(map(looks_like_camera, pose.names)) for pose in self.poses)
+        if cameras and place not in cameras and not between:
             raise InputError(
-                f"{self.source}: {place} and {camera} are the poses of a radar and of a camera in a frame that both share: "
-                "cocalib import composes them; or take one as it is with --pose NAME"
+                f"{self.source}: {place} and {cameras[0]} are the poses of a radar and of a camera in a frame that both share: "
+                "cocalib import composes them if their numbers can mean one thing only; or take one as it is with --pose NAME"
             )
+
+
+def _is_of_camera_alone(pose: FoundPose) -> bool:
+    names = pose.names
+    others = (*filter(looks_like_radar, names), *filter(looks_like_lidar, names))
+    return any(map(looks_like_camera, names)) and not others
 
 
 def read_unstated(content: str | bytes, source: str = "calibration") -> UnstatedFile | None:
@@ -109,7 +123,12 @@ def read_unstated(content: str | bytes, source: str = "calibration") -> Unstated
             stem = PurePath(source).name.partition(".")[0]
             poses = tuple(_hinted_by_name(pose, stem) for pose in found.poses)
             around = {pose.place: _camera_in(_object_around(pose.place, values), source) for pose in poses}
-            beside = {place: camera for place, camera in around.items() if camera is not None}
+            blocks = {place.rpartition(".")[2] for place in around}
+            beside = {
+                place: camera
+                for place, camera in around.items()
+                if camera is not None and camera.name not in blocks - {place.rpartition(".")[2]}
+            }
             return UnstatedFile(source, poses, found.unreadable, _camera_in(values, source), beside)
         unreadable = found.unreadable or unreadable
     if unreadable:

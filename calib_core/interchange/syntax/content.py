@@ -17,6 +17,9 @@ Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, other bytes, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
+_PRINTED = re.compile(r"\s*\{\s*'")  # a dict as Python prints it, which is YAML
+_LABEL = re.compile(r"\s*(?P<name>[A-Za-z]\w*)\s*[:=]")
+_SIZES_OF_POSES = (9, 12, 16)
 _LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
 
 
@@ -98,7 +101,10 @@ def decoded(content: str | bytes, *, source: str) -> str:
 
 def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     start = text.lstrip()[:1]
-    if start in ("{", "[") and not _LOGGED.match(text):
+    if _PRINTED.match(text):
+        value = joined_documents(yaml_documents(text, source=source), source=source)
+        yield Content("yaml", text=text, value=value)
+    elif start in ("{", "[") and not _LOGGED.match(text):
         yield Content("json", text=text, value=json_value(text, source=source))
     elif start == "<":
         root = parse_xml(text, source=source)
@@ -111,6 +117,29 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
         except InputError as error:
             if source.lower().endswith((".yaml", ".yml")):
                 raise
+            blocks = _labeled_numbers(text)
+            if any(sum(map(len, rows)) in _SIZES_OF_POSES for rows in blocks.values()):
+                yield Content("yaml", text=text, value=blocks)
+                return
             why = str(error).removeprefix(f"{source}: ")
             raise InputError(f"{source}: is in no format that is read here; if it is meant to be YAML: {why}") from None
         yield Content("yaml", text=text, value=joined_documents(documents, source=source), documents=documents)
+
+
+def _labeled_numbers(text: str) -> dict[str, list[list[float]]]:
+    """Return the rows of numbers beside and below each name, as MATLAB and terminals print R and t; the first of a name."""
+    found: dict[str, list[list[float]]] = {}
+    name = ""
+    for line in re.split(r"[\n;]", text.replace("...", "")):
+        label = _LABEL.match(line)
+        if label:
+            name = "" if label["name"] in found else label["name"]
+        words = re.sub(r"[\[\](),]", " ", line[label.end() :] if label else line).split()
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            name = ""
+            continue
+        if name and row:
+            found.setdefault(name, []).append(row)
+    return found

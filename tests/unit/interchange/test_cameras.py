@@ -301,10 +301,9 @@ def test_a_plumb_bob_survives_every_format_to_the_last_digit(to, distortion, foc
     np.testing.assert_allclose(again.matrix_px, camera.matrix_px, rtol=1e-15)
 
 
-@pytest.mark.parametrize("to", ["opencv", "opencv-xml", "opencv-json"])
-def test_opencv_reads_its_own_formats(to, tmp_path):
-    camera, path = typical_camera("plumb_bob"), tmp_path / f"camera{CAMERA_FORMATS[to].suffix}"
-    path.write_text(str(camera_content(camera, to)), encoding="utf-8")
+def test_opencv_reads_its_format(tmp_path):
+    camera, path = typical_camera("plumb_bob"), tmp_path / "camera.yml"
+    path.write_text(str(camera_content(camera, "opencv")), encoding="utf-8")
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     np.testing.assert_array_equal(storage.getNode("camera_matrix").mat(), camera.matrix_px)
     np.testing.assert_array_equal(storage.getNode("distortion_coefficients").mat().ravel(), camera.distortion)
@@ -452,3 +451,17 @@ def test_a_camera_that_is_not_supported_does_not_hide_the_others(content, good, 
     assert read_camera(content, name=good).matrix_px[0, 2] == 320.0
     with pytest.raises(InputError, match=why):
         read_camera(content, name=bad)
+
+
+def test_cameras_in_blocks_by_name_are_chosen_by_it():
+    block = {"fx": 1061.2, "fy": 1060.9, "cx": 956.1, "cy": 560.4, "width": 1920, "height": 1080}
+    text = json.dumps({"left": block | {"disto": [-0.04, 0.01, 0.0, 0.0, -0.005]}, "right": block | {"fx": 1062.0}})
+    with pytest.raises(InputError, match=r"contains 2 cameras; choose one: .*#left, .*#right"):
+        read_camera(text)
+    left, right = (read_camera(text, name=name) for name in ("left", "right"))
+    assert (left.distortion.tolist(), right.matrix_px[0, 0]) == ([-0.04, 0.01, 0.0, 0.0, -0.005], 1062.0)
+
+
+def test_text_without_a_camera_says_what_was_looked_for():
+    with pytest.raises(InputError, match=r"no camera in it: looked for .*; read as YAML: line 2: not YAML"):
+        read_camera(' Intrinsic of "Color" / 640x480\n  Width: 640\n  Fx: 612.9\n', "rs.txt")

@@ -342,3 +342,55 @@ def test_the_pose_of_one_of_the_two_in_something_else_is_left_to_a_person(name):
     pose = file.pose_at(None)
     assert pose.hints.other
     assert clear_one(pose, hypotheses_of(pose)) is None
+
+
+LASER = """% Transformation matrix specifies laser coordinate frame
+% in the reference frame of the camera
+%-- Translation vector (t)
+t = [ 0.051 ; -0.312 ; -0.120 ]
+%-- Rotation matrix (R)
+R = ...
+[ 0.017452  -0.999848  0.000000 ;...
+  0.000000  0.000000  -1.000000 ;...
+  0.999848  0.017452  0.000000 ]
+"""
+PRINTED = """Extrinsic:
+R:
+0.017452 -0.999848 0
+0 0 -1
+0.999848 0.017452 0
+t: 0.051 -0.312 -0.120
+************* the same, again *************
+R: 1
+"""
+DICT = "{'T': [0.051, -0.312, -0.120],\n 'R': [[0.017452, -0.999848, 0], [0, 0, -1], [0.999848, 0.017452, 0]], 'to': 'camera'}"
+
+
+@pytest.mark.parametrize("text", [LASER, PRINTED, DICT], ids=["matlab", "terminal", "python"])
+def test_a_pose_that_a_program_printed_is_found(text):
+    file = read_unstated(text, "printed.txt")
+    assert file is not None
+    (pose,) = file.poses
+    first = hypotheses_of(pose)[0]
+    assert first.key == "camera_from_radar,optical,m"
+    np.testing.assert_allclose(first.camera_from_radar.translation_m, [0.051, -0.312, -0.120])
+
+
+def test_the_poses_of_radar_and_camera_in_one_frame_are_not_the_pose_between_them():
+    sensors = {
+        "radar_calib": {"T": [0.0, 0.0, 0.0], "R": [0.0, 0.0, 0.0]},
+        "left_cam_calib": {
+            "T": [0.34, -0.07, 0.29],
+            "R": [1.28, -0.53, 0.0],
+            "fx": 338.0,
+            "fy": 339.0,
+            "cx": 342,
+            "cy": 201,
+        },
+    }
+    with pytest.raises(
+        InputError, match="radar_calib and left_cam_calib are the poses of a radar and of a camera in a frame"
+    ):
+        read_clear(json.dumps(sensors))
+    with pytest.raises(InputError, match="does not state what its numbers mean"):  # that nobody has filled in
+        read_clear(json.dumps({"T_radar": np.eye(4).tolist()}))

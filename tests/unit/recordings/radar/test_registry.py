@@ -100,7 +100,9 @@ def test_types_that_ros_defines_are_read_from_bags_without_definitions(name, ros
 
 def test_files_of_a_package_beside_a_database_define_its_messages(ros2, write):
     ros2.define("our_msgs/msg/Target", "float32 range\nfloat32 azimuth\nfloat32 doppler_velocity\n")
-    ros2.define("our_msgs/msg/Targets", "std_msgs/Header header\nour_msgs/Target[] targets\ngeometry_msgs/Point mount\n")
+    ros2.define(
+        "our_msgs/msg/Targets", "std_msgs/Header header\nour_msgs/Target[] targets\ngeometry_msgs/Point mount\n"
+    )
     target = ros2.new("our_msgs/msg/Target", range=5.0, azimuth=0.1, doppler_velocity=0.0)
     mount = ros2.new("geometry_msgs/msg/Point", x=0.0, y=0.0, z=0.0)
     message = ros2.new("our_msgs/msg/Targets", header=ros2.header(START_NS), targets=[target] * 3, mount=mount)
