@@ -87,7 +87,7 @@ class Intrinsics:
     out: OutFile = None
     """Write the intrinsics to this file (ROS camera_info YAML unless --to or the suffix says otherwise)."""
     to: Annotated[str | None, called("FORMAT")] = None
-    """Format of the intrinsics: ros, kalibr, opencv, opencv-xml, opencv-json, colmap, json."""
+    """Format of the intrinsics: ros, kalibr, opencv, colmap, json."""
     rescale: Annotated[str | None, called("WIDTHxHEIGHT")] = None
     """With a file with intrinsics: convert them to the same images, resized to this size [px]."""
     views: OutFile = None

@@ -20,7 +20,7 @@ from cocalib.platform.terminal import print_exactly
 from cocalib.view.wording import plain, sentence, with_sigma
 
 CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".bin", ".conf")
-_BY_SUFFIX = {".json": "json", ".xml": "opencv-xml"}
+_BY_SUFFIX = {".json": "json"}
 DOUBTFUL = frozenset(
     {
         "large-residuals",
@@ -172,7 +172,16 @@ def size_of(text: str) -> tuple[int, int]:
 
 
 def camera_format(to: str | None, out: Path | None) -> str:
-    """Return the format: as asked for, by the suffix of the file, else ROS camera_info YAML."""
+    """Return the format: as asked for, by the suffix of the file, else ROS camera_info YAML.
+
+    Raises:
+        InputError: the suffix is of a format that is read only.
+    """
     if to is not None:
         return to
-    return _BY_SUFFIX.get(out.suffix.lower(), "ros") if out is not None else "ros"
+    suffix = "" if out is None else out.suffix.lower()
+    if suffix in (".xml", ".mat", ".cameramodel"):
+        raise InputError(
+            f"{out}: no intrinsics are written as {suffix}; name the file .yaml or .json, or give the format: --to opencv"
+        )
+    return _BY_SUFFIX.get(suffix, "ros")

@@ -16,7 +16,7 @@ from calib_core.interchange.cameras.kalibr import KALIBR_CHAIN
 from calib_core.interchange.cameras.kitti import KITTI_CAMERAS_FILE
 from calib_core.interchange.cameras.matlab import MATLAB_PARAMETERS
 from calib_core.interchange.cameras.mrcal import MRCAL
-from calib_core.interchange.cameras.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
+from calib_core.interchange.cameras.opencv import OPENCV_YAML
 from calib_core.interchange.cameras.ros import ROS
 from calib_core.interchange.own.documents import camera_document
 from calib_core.interchange.syntax.strict_json import json_object, json_text
@@ -166,7 +166,11 @@ def _load(text: str, *, source: str) -> Any:
         return json_object(text, source=source)
     if start == "<":
         return load_opencv_xml(text, source=source)
-    return load_yaml(text, source=source)
+    try:
+        return load_yaml(text, source=source)
+    except InputError as error:
+        why = str(error).removeprefix(f"{source}: ")
+        raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; read as YAML: {why}") from None
 
 
 def _choose_camera(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) -> FoundCamera:
@@ -195,8 +199,6 @@ CAMERA_FORMATS: dict[str, CameraFormat] = {
         ROS,
         KALIBR_CHAIN,
         OPENCV_YAML,
-        OPENCV_XML,
-        OPENCV_JSON,
         COLMAP_CAMERAS,
         OWN_JSON,
     )

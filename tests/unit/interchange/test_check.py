@@ -282,7 +282,7 @@ def test_formats_that_cannot_store_the_lens_refuse_it(file):
         (
             skewed,
             "opencv",
-            "OpenCV's camera models have no skew, but this camera has; export with --to json or matlab",
+            "OpenCV's camera models have no skew, but this camera has; export with --to json",
         ),
     ]
     for camera, name, words in cases:
