@@ -99,6 +99,8 @@ def _excluded_words(excluded: DataWarning | None) -> str:
     if excluded is None:
         return ""
     facts = excluded.facts
+    if "ids" not in facts:  # read from a file
+        return "pairs excluded by residual"
     return f"{len(facts['ids'])} excluded by residual (AED of all {facts['all_aed_px']:.3g} px)"
 
 
