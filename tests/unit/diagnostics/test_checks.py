@@ -16,7 +16,6 @@ from calib_core.diagnostics.clocks import clock_offset
 from calib_core.diagnostics.pose import two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.gnc import GncSolution
-from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration
 from calib_core.measurements import NS_PER_S, Pair, RadarScans, TimeNs, Unsolvable
 from calib_core.options import (
@@ -148,7 +147,7 @@ def test_who_excludes_the_longest_residuals_is_told_with_the_error_of_all(method
     assert cut.metrics.aed_px == excluded.facts["aed_px"] < excluded.facts["all_aed_px"]
     assert excluded.facts["all_aed_px"] == pytest.approx(np.mean([pair.distance_px for pair in cut.pairs]))
     assert verdict_on(cut).excluded is excluded
-    read = read_calibration(calibration_text(CalibrationFile(cut))).calibration
+    read = read_calibration(calibration_text(cut)).calibration
     assert "excluded by residual" in str(verdict_on(read))
     assert warning_remark(excluded).action == ReviewPairs(tuple(excluded.facts["ids"]))
     for chosen in (ids[-5:], ids[::4], ids[:1]):
