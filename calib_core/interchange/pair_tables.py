@@ -12,9 +12,10 @@ from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import is_known_binary, no_text
-from calib_core.interchange.hypotheses.plain_values import is_npy, plain_values
+from calib_core.interchange.hypotheses.plain_values import plain_values
 from calib_core.interchange.own.pairs_files import PairsFile
 from calib_core.interchange.syntax.content import readings
+from calib_core.interchange.syntax.npy_file import is_npy
 from calib_core.measurements import NS_PER_S
 from calib_core.options import NoiseOptions
 from calib_core.recordings.containers.sources import Assumption

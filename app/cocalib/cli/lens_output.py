@@ -19,7 +19,7 @@ from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 from cocalib.view.wording import plain, sentence, with_sigma
 
-CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".bin", ".conf")
+CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".npz", ".bin", ".conf")
 _BY_SUFFIX = {".json": "json"}
 DOUBTFUL = frozenset(
     {
@@ -180,7 +180,7 @@ def camera_format(to: str | None, out: Path | None) -> str:
     if to is not None:
         return to
     suffix = "" if out is None else out.suffix.lower()
-    if suffix in (".xml", ".mat", ".cameramodel"):
+    if suffix in (".xml", ".mat", ".npz", ".cameramodel"):
         raise InputError(
             f"{out}: no intrinsics are written as {suffix}; name the file .yaml or .json, or give the format: --to opencv"
         )

@@ -19,6 +19,7 @@ _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
     "Camera_Matrix": ("Distortion_Coefficients",),
     "cameraMatrix": ("distCoeffs",),
+    "mtx": ("dist", "dist_coeffs", "distortion"),
     "intrinsic_matrix": ("distortion", "distortion_coefficients"),
     "K": ("D",),
     "k": ("d",),

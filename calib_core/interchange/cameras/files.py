@@ -16,7 +16,7 @@ from calib_core.interchange.cameras.kalibr import KALIBR_CHAIN
 from calib_core.interchange.cameras.kitti import KITTI_CAMERAS_FILE
 from calib_core.interchange.cameras.matlab import MATLAB_PARAMETERS
 from calib_core.interchange.cameras.mrcal import MRCAL
-from calib_core.interchange.cameras.opencv import OPENCV_YAML
+from calib_core.interchange.cameras.opencv import OPENCV_NPZ, OPENCV_YAML
 from calib_core.interchange.cameras.ros import ROS
 from calib_core.interchange.own.documents import camera_document
 from calib_core.interchange.syntax.strict_json import json_object, json_text
@@ -138,7 +138,7 @@ def holds_camera(text: str, source: str = "camera") -> bool:
 def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
     """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
     written = (known.own_syntax for known in CAMERA_FORMATS.values() if known.own_syntax is not None)
-    for syntax in (*written, MRCAL, KITTI_CAMERAS_FILE, MATLAB_PARAMETERS):
+    for syntax in (*written, MRCAL, KITTI_CAMERAS_FILE, MATLAB_PARAMETERS, OPENCV_NPZ):
         if syntax.recognizes(content):
             return syntax.read(content, source)
     return ()

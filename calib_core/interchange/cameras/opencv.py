@@ -1,10 +1,14 @@
-"""OpenCV's FileStorage, with the keys of OpenCV's own calibration sample."""
+"""OpenCV's FileStorage with the keys of its calibration sample, and the same arrays as Python saves them, in npz."""
 
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, refuse_skew
+from calib_core.errors import InputError
+from calib_core.interchange.cameras.camera_format import HASH_TAG, CameraFormat, FoundCamera, OwnSyntax, refuse_skew
+from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.syntax.npy_file import load_npz
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.interchange.syntax.zip_archives import unpack
 from calib_core.lens_models.registry import written_lens
 
 
@@ -28,3 +32,19 @@ def _write_yaml(camera: Camera, name: str) -> str:
 
 
 OPENCV_YAML = CameraFormat("opencv", "OpenCV FileStorage YAML", ".yml", _write_yaml, ending=HASH_TAG)
+
+
+def _is_npz(content: str | bytes) -> bool:
+    return isinstance(content, bytes) and content.startswith(b"PK") and b".npy" in content
+
+
+def _read_npz(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
+    arrays = load_npz(unpack(content, source=source) if isinstance(content, bytes) else {}, source=source)
+    values = {name: array.tolist() for name, array in arrays.items() if array is not None}
+    cameras = find_cameras(values, source=source)
+    if not cameras:
+        raise InputError(f"{source}: no array camera_matrix, mtx or K in it; found {', '.join(arrays)}")
+    return cameras
+
+
+OPENCV_NPZ = OwnSyntax(_is_npz, _read_npz)

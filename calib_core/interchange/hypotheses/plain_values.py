@@ -1,16 +1,14 @@
 """The values in a file of any syntax, npy among them: mappings, lists, text and arrays of numbers, whatever wrote them."""
 
-import math
 import re
-import struct
 from collections.abc import Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.syntax.npy_file import is_npy, load_npy, load_npz
 
 _MOST_NUMBERS = 64
 _DEEPEST = 40
@@ -28,8 +26,7 @@ def plain_values(content: Content, *, source: str) -> Any:
         InputError: an array in it is damaged, or is not of numbers.
     """
     if content.syntax == "archive":
-        arrays = (name for name in content.members if name.endswith(".npy"))
-        return {name.removesuffix(".npy"): _member(content.members[name], f"{source}: {name}") for name in arrays}
+        return load_npz(content.members, source=source)
     if content.syntax == "mat":
         return dict(content.variables)
     if content.syntax == "bytes":
@@ -37,14 +34,6 @@ def plain_values(content: Content, *, source: str) -> Any:
     if content.syntax == "xml" and content.value is None:
         return {content.root.tag: _element(content.root)}
     return _rows(content.lines) if content.syntax == "lines" else content.value
-
-
-def _member(data: bytes, source: str) -> np.ndarray | None:
-    """Return an array of an archive; None if it is text, such as a frame's name, or objects."""
-    try:
-        return load_npy(data, source=source)
-    except InputError:
-        return None
 
 
 def _element(element: Element, depth: int = 0) -> Any:
@@ -127,37 +116,3 @@ def _shaped(numbers: np.ndarray | None, rows: Any, columns: Any) -> np.ndarray |
     if numbers is None or height is None or width is None or not height >= 1 or height * width != numbers.size:
         return numbers
     return numbers.reshape(int(height), -1) if height.is_integer() and width.is_integer() else numbers
-
-
-_MAGIC = b"\x93NUMPY"
-_HEADER = re.compile(
-    r"\{'descr': '([<>|=](?:f[248]|[iu][1248]|b1))', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,60})\), ?\}\s*"
-)
-
-
-def is_npy(data: bytes) -> bool:
-    """Return whether a file's first bytes are those of an npy file."""
-    return data.startswith(_MAGIC)
-
-
-def load_npy(data: bytes, *, source: str) -> np.ndarray:
-    """Return the array in an npy file as float64.
-
-    Raises:
-        InputError: it is damaged, or contains anything other than numbers, such as pickled objects.
-    """
-    if len(data) < 12:
-        raise InputError(f"{source}: a damaged npy file; save it again with numpy.save")
-    wide = data[6] > 1
-    (length,) = struct.unpack_from("<I" if wide else "<H", data, 8)
-    start = 12 if wide else 10
-    match = _HEADER.fullmatch(data[start : start + length].decode("latin-1"))
-    if match is None:
-        raise InputError(f"{source}: not an array of numbers; save a plain array with numpy.save")
-    shape = tuple(int(size) for size in match[3].replace(",", " ").split())
-    numbers = np.dtype(match[1])
-    body = data[start + length :]
-    if math.prod(shape) * numbers.itemsize != len(body):
-        raise InputError(f"{source}: a damaged npy file: {len(body):,} bytes for the shape {shape}; save it again")
-    flat = np.frombuffer(body, numbers).astype(np.float64)
-    return flat.reshape(shape[::-1]).T if match[2] == "True" else flat.reshape(shape)

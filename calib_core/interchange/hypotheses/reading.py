@@ -87,7 +87,7 @@ class UnstatedFile:
         Raises:
             InputError: it has.
         """
-        cameras = [pose.place for pose in self.poses if pose.place in self.beside or _is_of_camera_alone(pose)]
+        cameras = [pose.place for pose in self.poses if _is_of_camera_alone(pose)] or [*self.beside]
         between = any(pose.place == place and any(map(looks_like_camera, pose.names)) for pose in self.poses)
         if cameras and place not in cameras and not between:
             raise InputError(
@@ -97,9 +97,8 @@ class UnstatedFile:
 
 
 def _is_of_camera_alone(pose: FoundPose) -> bool:
-    names = pose.names
-    others = (*filter(looks_like_radar, names), *filter(looks_like_lidar, names))
-    return any(map(looks_like_camera, names)) and not others
+    other = any(looks_like_radar(name) or looks_like_lidar(name) for name in pose.names)
+    return not other and any(map(looks_like_camera, pose.names))
 
 
 def read_unstated(content: str | bytes, source: str = "calibration") -> UnstatedFile | None:
@@ -123,12 +122,7 @@ def read_unstated(content: str | bytes, source: str = "calibration") -> Unstated
             stem = PurePath(source).name.partition(".")[0]
             poses = tuple(_hinted_by_name(pose, stem) for pose in found.poses)
             around = {pose.place: _camera_in(_object_around(pose.place, values), source) for pose in poses}
-            blocks = {place.rpartition(".")[2] for place in around}
-            beside = {
-                place: camera
-                for place, camera in around.items()
-                if camera is not None and camera.name not in blocks - {place.rpartition(".")[2]}
-            }
+            beside = {place: camera for place, camera in around.items() if camera is not None}
             return UnstatedFile(source, poses, found.unreadable, _camera_in(values, source), beside)
         unreadable = found.unreadable or unreadable
     if unreadable:

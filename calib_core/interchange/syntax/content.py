@@ -17,10 +17,11 @@ Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, other bytes, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
-_PRINTED = re.compile(r"\s*\{\s*'")  # a dict as Python prints it, which is YAML
 _LABEL = re.compile(r"\s*(?P<name>[A-Za-z]\w*)\s*[:=]")
 _SIZES_OF_POSES = (9, 12, 16)
-_LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
+_NO_JSON = re.compile(
+    r"\s*(\[(DEBUG|INFO|WARN|ERROR|FATAL)\]|\{\s*')"
+)  # ROS's log, which tf2_echo prints first; a dict of Python
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,10 +102,7 @@ def decoded(content: str | bytes, *, source: str) -> str:
 
 def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     start = text.lstrip()[:1]
-    if _PRINTED.match(text):
-        value = joined_documents(yaml_documents(text, source=source), source=source)
-        yield Content("yaml", text=text, value=value)
-    elif start in ("{", "[") and not _LOGGED.match(text):
+    if start in ("{", "[") and not _NO_JSON.match(text):
         yield Content("json", text=text, value=json_value(text, source=source))
     elif start == "<":
         root = parse_xml(text, source=source)

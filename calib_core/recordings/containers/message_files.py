@@ -12,28 +12,23 @@ def definition_beside(folder: Path, kind: str) -> str:
     """Return the definition of a type and of those it uses, from files PACKAGE/msg/TYPE.msg; "" if there is none."""
     texts: dict[str, str] = {}
     waiting = [kind]
-    while waiting:
-        name = waiting.pop()
-        text = "" if name in texts or not _NAME.fullmatch(name) else _text(folder / f"{name}.msg")
-        if not text and texts and name not in texts:
-            text = _standard(name)
+    for name in waiting:
+        text = "" if name in texts else _text(folder, name, standard=name != kind)
         if text:
             texts[name] = text if name == kind else f"\n{'=' * 80}\nMSG: {name}\n{text}"
             package = name.partition("/")[0]
-            waiting += [
-                used.replace("/", "/msg/") if "/" in used else f"{package}/msg/{used}" for used in _USED.findall(text)
-            ]
+            used = (one if "/" in one else f"{package}/{one}" for one in _USED.findall(text))
+            waiting += sorted({one.replace("/", "/msg/") for one in used} - {*waiting})
     return "".join(texts.values())
 
 
-def _text(file: Path) -> str:
-    if file.is_file() and file.stat().st_size <= _LONGEST:
+def _text(folder: Path, name: str, *, standard: bool) -> str:
+    """Return a type's own file, or what every ROS 2 installs; "" if there is neither."""
+    file = folder / f"{name}.msg"
+    if _NAME.fullmatch(name) and file.is_file() and file.stat().st_size <= _LONGEST:
         return file.read_text("utf-8", errors="replace")
-    return ""
-
-
-def _standard(name: str) -> str:
-    """Return the definition of a type that is installed with every ROS 2."""
+    if not standard:
+        return ""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)

@@ -465,3 +465,15 @@ def test_cameras_in_blocks_by_name_are_chosen_by_it():
 def test_text_without_a_camera_says_what_was_looked_for():
     with pytest.raises(InputError, match=r"no camera in it: looked for .*; read as YAML: line 2: not YAML"):
         read_camera(' Intrinsic of "Color" / 640x480\n  Width: 640\n  Fx: 612.9\n', "rs.txt")
+
+
+@pytest.mark.parametrize("names", [("camera_matrix", "dist_coeffs"), ("mtx", "dist")])
+def test_the_arrays_of_opencvs_python_tutorial_are_a_camera_of_the_recordings_size(names, tmp_path):
+    camera = typical_camera("plumb_bob")
+    arrays = dict(zip(names, (camera.matrix_px, camera.distortion[None]), strict=True))
+    np.savez(tmp_path / "camera.npz", **arrays)
+    again = read_camera_file(tmp_path / "camera.npz", image_size_px=(camera.width_px, camera.height_px))
+    np.testing.assert_array_equal(again.parameters, camera.parameters)
+    np.savez(tmp_path / "other.npz", rvecs=np.zeros((3, 1)))
+    with pytest.raises(InputError, match="no array camera_matrix, mtx or K in it; found rvecs"):
+        read_camera_file(tmp_path / "other.npz")
