@@ -156,18 +156,14 @@ class CameraFormat:
 
     Attributes:
         name: as typed after --to.
-        title: what it is, for lists.
         suffix: usual for its files.
         write: the file's content for a camera and its name; raises InputError for a camera that the format cannot store.
-        own_syntax: how it is read if its syntax is its own; None if its keys say it.
         ending: the comment that tells whose file it is; "" if the content does.
     """
 
     name: str
-    title: str
     suffix: str
     write: Callable[[Camera, str], str]
-    own_syntax: OwnSyntax | None = None
     ending: str = ""
 
 

@@ -98,4 +98,5 @@ def _write(camera: Camera, _name: str) -> str:
     return f"# {TAG}\n{columns}\n{colmap_camera_line(camera)}"
 
 
-COLMAP_CAMERAS = CameraFormat("colmap", "COLMAP cameras.txt", ".txt", _write, OwnSyntax(_recognizes, _read))
+COLMAP_LINES = OwnSyntax(_recognizes, _read)
+COLMAP_CAMERAS = CameraFormat("colmap", ".txt", _write)

@@ -10,7 +10,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError, meant
 from calib_core.input_files import file_text, no_text, read_input
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera
-from calib_core.interchange.cameras.colmap import COLMAP_CAMERAS
+from calib_core.interchange.cameras.colmap import COLMAP_CAMERAS, COLMAP_LINES
 from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.cameras.kalibr import KALIBR_CHAIN
 from calib_core.interchange.cameras.kitti import KITTI_CAMERAS_FILE
@@ -19,9 +19,8 @@ from calib_core.interchange.cameras.mrcal import MRCAL
 from calib_core.interchange.cameras.opencv import OPENCV_NPZ, OPENCV_YAML
 from calib_core.interchange.cameras.ros import ROS
 from calib_core.interchange.own.documents import camera_document
-from calib_core.interchange.syntax.strict_json import json_object, json_text
-from calib_core.interchange.syntax.xml_places import load_opencv_xml
-from calib_core.interchange.syntax.yaml_text import load_yaml
+from calib_core.interchange.syntax.content import readings
+from calib_core.interchange.syntax.strict_json import json_text
 
 _MAX_BYTES = 512 * 1024 * 1024
 _LOOKED_FOR = (
@@ -137,8 +136,7 @@ def holds_camera(text: str, source: str = "camera") -> bool:
 
 def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
     """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
-    written = (known.own_syntax for known in CAMERA_FORMATS.values() if known.own_syntax is not None)
-    for syntax in (*written, MRCAL, KITTI_CAMERAS_FILE, MATLAB_PARAMETERS, OPENCV_NPZ):
+    for syntax in (COLMAP_LINES, MRCAL, KITTI_CAMERAS_FILE, MATLAB_PARAMETERS, OPENCV_NPZ):
         if syntax.recognizes(content):
             return syntax.read(content, source)
     return ()
@@ -159,18 +157,14 @@ def _keyed(text: str, *, source: str) -> tuple[FoundCamera, ...]:
 
 
 def _load(text: str, *, source: str) -> Any:
-    start = text.lstrip("\ufeff \t\r\n")[:1]
-    if not start:
+    """Return the values of JSON, YAML or FileStorage XML; None of other XML."""
+    text = text.lstrip("\ufeff \t\r\n")
+    if not text:
         raise InputError(f"{source}: empty; {_LOOKED_FOR}")
-    if start == "{":
-        return json_object(text, source=source)
-    if start == "<":
-        return load_opencv_xml(text, source=source)
     try:
-        return load_yaml(text, source=source)
+        return [reading.value for reading in readings(text, source=source)][-1]
     except InputError as error:
-        why = str(error).removeprefix(f"{source}: ")
-        raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; read as YAML: {why}") from None
+        raise error if text[0] in "{<" else InputError(f"{error}; {_LOOKED_FOR}") from None
 
 
 def _choose_camera(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) -> FoundCamera:
@@ -190,7 +184,7 @@ def _write(camera: Camera, _name: str) -> str:
     return json_text(msgspec.to_builtins(camera_document(camera)))
 
 
-OWN_JSON = CameraFormat("json", "JSON, with the covariance of the intrinsics", ".json", _write)
+OWN_JSON = CameraFormat("json", ".json", _write)
 
 
 CAMERA_FORMATS: dict[str, CameraFormat] = {

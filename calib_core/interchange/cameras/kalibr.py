@@ -34,4 +34,4 @@ def _write(camera: Camera, _name: str) -> str:
     return kalibr_camera_text(camera)
 
 
-KALIBR_CHAIN = CameraFormat("kalibr", "Kalibr camchain YAML", ".yaml", _write, ending=HASH_TAG)
+KALIBR_CHAIN = CameraFormat("kalibr", ".yaml", _write, ending=HASH_TAG)

@@ -31,7 +31,7 @@ def _write_yaml(camera: Camera, name: str) -> str:
     )
 
 
-OPENCV_YAML = CameraFormat("opencv", "OpenCV FileStorage YAML", ".yml", _write_yaml, ending=HASH_TAG)
+OPENCV_YAML = CameraFormat("opencv", ".yml", _write_yaml, ending=HASH_TAG)
 
 
 def _is_npz(content: str | bytes) -> bool:

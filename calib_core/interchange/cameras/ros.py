@@ -50,4 +50,4 @@ def _write(camera: Camera, name: str) -> str:
     return camera_info_text(camera, name)
 
 
-ROS = CameraFormat("ros", "ROS camera_info YAML", ".yaml", _write, ending=HASH_TAG)
+ROS = CameraFormat("ros", ".yaml", _write, ending=HASH_TAG)

@@ -121,18 +121,6 @@ def parse_xml(text: str, *, source: str, most_marks: int = 100_000) -> ElementTr
         raise InputError(f"{source}: not XML ({error}); save it as UTF-8") from None
 
 
-def load_opencv_xml(text: str, *, source: str) -> dict[str, Any]:
-    """Return a FileStorage XML's values: matrices become mappings with rows, cols and data, as in its YAML.
-
-    Raises:
-        InputError: it is some other XML.
-    """
-    root = parse_xml(text, source=source)
-    if not is_file_storage(root):
-        raise InputError(f"{source}: XML with <{root.tag}>; expected OpenCV's <opencv_storage>")
-    return opencv_values(root)
-
-
 def is_file_storage(root: ElementTree.Element) -> bool:
     """Return whether XML is OpenCV's FileStorage."""
     return root.tag == "opencv_storage"

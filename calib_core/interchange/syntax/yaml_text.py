@@ -6,22 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib_core.errors import InputError
-from calib_core.parsing import yaml_documents, yaml_nodes
-
-
-def load_yaml(text: str, *, source: str) -> Any:
-    """Parse YAML of plain values; OpenCV's header and matrices (as mappings with rows, cols, data) are supported.
-
-    `topic echo` ends each message with "---": an empty document is left out, and messages of transforms become one.
-
-    Raises:
-        InputError: it is not YAML, has several documents, or is too large to be a calibration.
-    """
-    return joined_documents(yaml_documents(text, source=source), source=source)
+from calib_core.parsing import yaml_nodes
 
 
 def joined_documents(documents: tuple[Any, ...], *, source: str) -> Any:
-    """Return the only document, or several messages of transforms as one.
+    """Return the only document, or several messages of transforms, as `topic echo` prints them, as one.
 
     Raises:
         InputError: there are several that are no messages of transforms.
@@ -96,7 +85,7 @@ class PlacedValue:
 
 
 def placed_yaml(text: str, *, source: str) -> tuple[PlacedValue, ...]:
-    """Return the documents of a YAML text that `load_yaml` accepts; empty ones are left out.
+    """Return the documents of a YAML text that `yaml_documents` accepts; empty ones are left out.
 
     Raises:
         InputError: it is not YAML, or too large to be a calibration.
