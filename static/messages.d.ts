@@ -805,6 +805,7 @@ export interface ProposalNews {
   progress: ProposingProgress;
   rows: ProposalRow[];
   unproposed: UnproposedRow[];
+  slips: string[];
 }
 
 /** Progress of a long operation. */

@@ -147,7 +147,7 @@ def appearances_of(
     for click in clicks:
         pixel_px = np.array([click.u_px, click.v_px])
         view = view_at(click.image_time, pixel_px, views)
-        if view is None or beside_the_reflector(click, views) is not None:
+        if view is None or _is_beside(click, view):
             continue
         others = [one for one in _meanwhile(click.image_time, views) if one is not view and has_changed(one, pixel_px)]
         shown = [look for one in (view, *others) if (look := appearance_of(one, frames, pixel_px)) is not None]
@@ -178,14 +178,10 @@ def _meanwhile(image_time: TimeNs, views: Sequence[DwellView]) -> list[DwellView
     return [view for view in views if view.placement.start <= image_time <= view.placement.end and len(view.frames)]
 
 
-def beside_the_reflector(click: ReflectorClick, views: Sequence[DwellView]) -> float | None:
-    """Return how far a click is from the nearest place that changed [px], if a reflector is seen there; None if it is on it."""
-    pixel_px = np.array([click.u_px, click.v_px])
-    view = view_at(click.image_time, pixel_px, views)
-    if view is None or not any(candidate.has_apex for candidate in view.candidates):
-        return None
-    off_px = _distance_px(view, pixel_px)
-    return off_px if off_px > _BESIDE * view.width_px else None
+def _is_beside(click: ReflectorClick, view: DwellView) -> bool:
+    """Return whether a click is far from every place that changed while a reflector is seen at one of them."""
+    off_px = _distance_px(view, np.array([click.u_px, click.v_px]))
+    return off_px > _BESIDE * view.width_px and any(candidate.has_apex for candidate in view.candidates)
 
 
 def _distance_px(view: DwellView, pixel_px: np.ndarray) -> float:

@@ -52,6 +52,19 @@ class Proposal:
         freeze(self, pixel_px=(2,))
 
 
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A click that is probably wrong: the images and the other placements show the reflector beside it.
+
+    Attributes:
+        click: its id.
+        off_px: how far away they show it.
+    """
+
+    click: str
+    off_px: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposals:
     """All proposals of a recording, the most confident first.
@@ -62,6 +75,7 @@ class Proposals:
         agreement: the rough pose that they agree on; None if there is none.
         chance: how far chance goes.
         reflectors: probability that what stood there is a reflector and not a person.
+        slips: confirmed clicks that are probably wrong.
     """
 
     ranked: tuple[Proposal, ...]
@@ -69,6 +83,7 @@ class Proposals:
     agreement: PoseAgreement | None = None
     chance: Chance | None = None
     reflectors: float = 1.0
+    slips: tuple[Slip, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

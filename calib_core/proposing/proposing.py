@@ -13,6 +13,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
 from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     ClicksAgreement,
@@ -21,7 +22,7 @@ from calib_core.proposing.pose_agreement import (
     pose_agreement,
     reflector_log_odds,
 )
-from calib_core.proposing.proposals import Proposal, Proposals
+from calib_core.proposing.proposals import Proposal, Proposals, Slip
 
 LEAST_CONFIDENCE = 0.5
 """What is less probably the reflector is not proposed."""
@@ -31,6 +32,8 @@ _TEMPER = 1.6
 """By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
 _LIKE_A_CLICK = 0.8
 """How far a likeness to what a person clicked is trusted without a pose."""
+_SLIPS, _SLIP_PX, _UNREPORTED = 0.05, 50.0, 0.15
+"""Share of the clicks that slip off the reflector, by how far, and share of those on one that the radar does not report."""
 _MORE_LIKELY = 0.5
 _FEW_DWELLS = 5
 _FAR_SIGMA = 3.5
@@ -82,7 +85,7 @@ def proposals_of(
     if chance is None and agreement is not None:
         chance = chance_of(views, camera, options, confirmed=clicks)
     judged = _Judged.of(views, rays, agreement, by_clicks, chance)
-    covered = _clicks_by_dwell(rays, judged, len(clicks))
+    covered, slips = _clicks_by_dwell(rays, judged, clicks, camera)
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
@@ -98,23 +101,39 @@ def proposals_of(
             range_m = np.linalg.norm(marked.position_radar_m)
             unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
-    return Proposals(tuple(ranked), tuple(unproposed), agreement, chance, judged.reflectors)
+    return Proposals(tuple(ranked), tuple(unproposed), agreement, chance, judged.reflectors, slips)
 
 
-def _clicks_by_dwell(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
+def _clicks_by_dwell(
+    rays: CandidateRays, judged: "_Judged", clicks: Sequence[ReflectorClick], camera: Camera
+) -> tuple[dict[int, list[int]], tuple[Slip, ...]]:
     """Return the dwells with the rows of their confirmed clicks: each click is of the one of its dwells that it suits best.
 
-    If something else there is probably the reflector, it is of none: the radar shows another one at that time.
+    If something else there is probably the reflector, the click slipped off it, or is of none: the radar shows another one then.
     """
-    found: dict[int, list[int]] = {}
-    for row in range(clicks):
+    covered: dict[int, list[int]] = {}
+    slips = []
+    for row, click in enumerate(clicks):
         dwells, which = np.nonzero(rays.click == row)
-        if len(dwells):
-            fits = judged.probability[dwells, which] + 1e-6 * rays.odds[dwells, which]
-            dwell = int(dwells[np.argmax(fits)])
-            if judged.probability[dwell][rays.click[dwell] < 0].max(initial=0.0) < LEAST_CONFIDENCE:
-                found.setdefault(dwell, []).append(row)
-    return found
+        if not len(dwells):
+            continue
+        fits = judged.probability[dwells, which] + 1e-6 * rays.odds[dwells, which]
+        dwell = int(dwells[np.argmax(fits)])
+        others = np.where(rays.click[dwell] < 0, judged.probability[dwell], 0.0)
+        if others.max() >= LEAST_CONFIDENCE:
+            pixel_px = judged.candidate(dwell, int(np.argmax(others))).pixel_px
+            off_px = float(np.hypot(*(pixel_px - [click.u_px, click.v_px])))
+            if not _is_slip(off_px, camera):
+                continue
+            slips.append(Slip(click.id, off_px))
+        covered.setdefault(dwell, []).append(row)
+    return covered, tuple(slips)
+
+
+def _is_slip(off_px: float, camera: Camera) -> bool:
+    """Return whether a click so far from the reflector is more probably meant for it than for another one, anywhere."""
+    density = np.exp(-0.5 * (off_px / _SLIP_PX) ** 2) / (2.0 * np.pi * _SLIP_PX**2)
+    return bool(_SLIPS * density > _UNREPORTED / (camera.width_px * camera.height_px))
 
 
 def _marked(proposal: Proposal, view: DwellView, own: Sequence[tuple[Placement, ReflectorClick]]) -> Placement | None:
@@ -183,13 +202,16 @@ class _Judged:
         order = [k for k in np.argsort(-probability, kind="stable").tolist() if self._is_candidate(i, k)]
         if not order or probability[order[0]] < LEAST_CONFIDENCE:
             return None
-        first = len(self.rays.click[i][self.rays.click[i] >= 0])
-        candidates = tuple(view.candidates[k - first] for k in order)
+        candidates = tuple(self.candidate(i, k) for k in order)
         confidence = float(min(probability[order[0]], 1.0))
         best = candidates[0]
         is_vague = best.sigma_px > _VAGUE_PX or (confidence < _UNSURE and not best.has_apex)
         reason = self.reason(i) if confidence < _WEAK else _VAGUE if is_vague else ""
         return Proposal(view.placement, view.image_time, best.pixel_px, best.sigma_px, confidence, candidates, reason)
+
+    def candidate(self, i: int, k: int) -> ImageCandidate:
+        """Return the candidate of a column, which is no click."""
+        return self.views[i].candidates[k - int((self.rays.click[i] >= 0).sum())]
 
     def _is_candidate(self, i: int, k: int) -> bool:
         """Return whether a column is one of the view's candidates, not a click or padding."""

@@ -87,6 +87,7 @@ const RULES = [
   { name: "beyond", when: ({ click, verdict }) => click?.state === "unpaired" && verdict.option === RANGE.option, say: () => BEYOND, act: true },
   { name: "unpaired", when: ({ click }) => click?.state === "unpaired", say: () => ["No radar position here: click another frame of this placement.", NEXT], act: true },
   { name: "set-aside", when: ({ click }) => click?.state === "outlier" && !click.disagrees, say: ({ click }) => [click?.note ?? ""], act: true }, // the method or an option does it
+  { name: "slip", when: ({ click }) => click && slips().includes(click.id), say: slipWords, act: true },
   { name: "misfit", when: ({ click }) => click?.state === "outlier", say: misfitWords, act: true },
   { name: "dismissed", when: ({ click, placement }) => !click && placement && isDismissed(placement), say: () => ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT] },
   { name: "placement", when: ({ click, placement }) => !click && placement && isOffered(placement), say: placementHere, act: true },
@@ -94,6 +95,7 @@ const RULES = [
   { name: "done", when: ({ verdict }) => verdict.done, say: doneWords },
   { name: "out-of-range", when: ({ verdict }) => verdict.option === RANGE.option, say: () => BEYOND },
   { name: "misfits", when: ({ verdict }) => misfits(verdict), say: ({ verdict, open }) => [misfits(verdict), SHOW, ...onward(open)] },
+  { name: "slips", when: () => slips().length, say: ({ open }) => [`${called(slips()[0])} does not fit the images`, { key: "", label: "show", pair: slips()[0] }, ...onward(open)] },
   { name: "coming", when: ({ verdict, open }) => verdict.key === "N" && clicks().length && !open.length, say: () => [] }, // the last one is on its way
   { name: "one-more", when: ({ verdict }) => verdict.key === "N" && verdict.kind === "FollowHint", say: ({ verdict }) => [said(verdict.action), NEXT] },
   { name: "next", when: ({ verdict }) => verdict.key === "N", say: () => [{ ...NEXT, label: proposalAdvice() }] },
@@ -128,6 +130,15 @@ function misfitWords({ click }) {
   const carried = state.placements.length > 0 && !placementsAt(frame).length ? " Was the reflector being carried?" : "";
   const others = state.candidates?.click === id && state.candidates.rows.length > 1;
   return [`#${nameOf(id)} does not fit the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
+}
+
+/** The clicks beside which the images show the reflector. */
+const slips = () => (state.proposals?.slips ?? []).filter((id) => clicks().some((click) => click.id === id && !["untouched", "excluded"].includes(click.state)));
+
+/** @param {Now} now @returns {Words} */
+function slipWords({ click }) {
+  const { id } = /** @type {import("../messages.js").ClickRow} */ (click);
+  return [`#${nameOf(id)} does not fit the images: the reflector is probably beside it. Is the mark on the inner corner?`, EXCLUDE];
 }
 
 /** @returns {Words} */

@@ -30,6 +30,22 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     assert rule(page) == "next", "what is excluded is named no more"
 
 
+def test_a_click_beside_what_the_images_show_is_named_and_shown(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.load_sample(truth, 5)
+    page.until("__cocalib.state.proposals")
+    third = page.view["clicks"][2]
+    page.value("void (__cocalib.state.proposals.slips = [__cocalib.state.view.clicks[2].id])")
+    page.go_to(0)
+    assert rule(page) in {"slips", "slip"}
+    assert "#3 " in page.text("#guide")
+    page.go_to(third["frame"])
+    assert rule(page) == "slip"
+    page.press("x")
+    page.go_to(0)
+    assert rule(page) not in {"slips", "slip"}
+
+
 def rule(page: Driver) -> str:
     """Return the name of the rule by which the line on the frame says what it says."""
     return str(page.page.get_attribute("#guide", "data-rule"))

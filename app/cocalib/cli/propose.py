@@ -97,15 +97,12 @@ def _deliver(
     from calib_core.measurements import TimeNs
     from calib_core.proposing.proposals import ProposalSource, proposals_json
     from cocalib.cli.proposal_table import proposal_lines
-    from cocalib.proposing import beside_the_reflector
 
-    for click in clicks:
-        if click.counts and (off_px := beside_the_reflector(click, views)) is not None:
-            print(
-                f"warning: click {click.id} is {off_px:.0f} px from everything that changed then, and a reflector is seen "
-                "elsewhere: look at it again; nothing is learned from it",
-                file=sys.stderr,
-            )
+    for slip in proposals.slips:
+        print(
+            f"warning: click {slip.click} is {slip.off_px:.0f} px beside what is probably the reflector: look at it again",
+            file=sys.stderr,
+        )
     confirmed = tuple(click.id for click in clicks if click.counts)
     source = ProposalSource(
         recording=tuple(name_text(path.name) for path in recording.paths),

@@ -145,6 +145,19 @@ def test_one_wrong_click_does_not_mislead():
     assert all(right(drawn, proposals))
 
 
+@pytest.mark.parametrize(("off_px", "slips"), [(0.0, False), (45.0, True), (400.0, False)])
+def test_a_click_that_slips_is_named_and_its_placement_is_not_offered(off_px, slips):
+    """What is much farther off may be another reflector, which the radar does not report."""
+    drawn = draw_views(3, Drawing(count=8, listed_share=1.0))
+    click = drawn.click(1)
+    click = replace(click, u_px=click.u_px + off_px * (1.0 if click.u_px < 640.0 else -1.0))
+    found = proposals_of(drawn.views, drawn.camera, OPTIONS, confirmed=[drawn.click(0), click, drawn.click(2)])
+    assert [slip.click for slip in found.slips] == [click.id] * slips
+    assert all(slip.off_px == pytest.approx(off_px, rel=0.5) for slip in found.slips)
+    offered = {proposal.placement.start for proposal in found.ranked}
+    assert (drawn.views[1].placement.start in offered) == (off_px > 100.0)
+
+
 def test_confidence_is_borne_out():
     """Of proposals with confidence p a share of about p is right, and the surer third is right more often than the other end."""
     drawn = [draw_views(seed, Drawing(count=10, decoys=6, first_share=0.4, listed_share=0.8)) for seed in range(6)]

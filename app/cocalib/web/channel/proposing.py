@@ -201,7 +201,8 @@ class ProposingService:
         without = tuple(
             UnproposedRow(number[id(one)], reason) for one, reason in now.proposals.unproposed if id(one) in number
         )
-        return ProposalNews(True, replace(now.progress, stage=stage, problem=problem, hint=hint), rows, without)
+        slips = tuple(slip.click for slip in now.proposals.slips)
+        return ProposalNews(True, replace(now.progress, stage=stage, problem=problem, hint=hint), rows, without, slips)
 
     def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
         """Return a proposal without the places that are marked already; without any, it is none."""

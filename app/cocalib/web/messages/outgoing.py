@@ -129,12 +129,14 @@ class ProposalNews:
         progress: how far they are, and why there are none.
         rows: the most confident first; placements that have a click are left out.
         unproposed: placements for which nothing can be proposed.
+        slips: ids of clicks that are probably wrong: the images show the reflector beside them.
     """
 
     on: bool
     progress: ProposingProgress
     rows: tuple[ProposalRow, ...] = ()
     unproposed: tuple[UnproposedRow, ...] = ()
+    slips: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
