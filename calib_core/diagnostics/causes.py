@@ -41,6 +41,21 @@ _SHARES = {"turn": 0.3, "move": 0.05, "range step": 0.05, "stated": 0.3, "other"
 _MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # tried; on each side
 _DIFFERENT = 0.25  # of the tests of a kind count: neighboring shapes and splits are nearly the same
 _COST = 2.0  # of the statistic, for each unknown of a cause (Akaike)
+_PLAUSIBLE: Mapping[str, float] = {
+    "range": 0.5,
+    "azimuth": np.deg2rad(0.3),
+    "elevation": np.deg2rad(0.3),
+    "column": 5.0,
+    "row": 5.0,
+    "focal length": 0.02,
+    "distortion": 15.0,
+    "turn": np.deg2rad(1.0),
+    "move": 0.1,
+    "range step": 0.1,
+}
+"""How large each is if it is there, where it does most [m, rad, px, share]; half of them are smaller. Guesses: a forgotten
+distortion moves the corners of an image by tens of pixels, an array is off by part of its beam, a bump turns by a degree."""
+_UNUSUAL = 6.0  # cost of a cause that the options state no prior of: a likelihood ratio of 20
 _BESIDE = 6.0  # fall of the statistic up to which another cause is not told apart: a likelihood ratio of 20
 
 Shape = Callable[[np.ndarray], Values]
@@ -96,13 +111,6 @@ class Cause:
             return self.quantity
         return "stated" if self.quantity in _OF_LENS or (self.quantity, self.shape) in _PRIORS else "other"
 
-    @property
-    def rarity(self) -> float:
-        """How much less likely it is than a wrong focal length or a step before any pair, as twice a logarithm."""
-        if self.split or self.quantity == "focal length":
-            return 0.0
-        return 6.0 if self.quantity in _OF_CLICKS and self.shape else 3.0
-
 
 @dataclass(frozen=True, slots=True)
 class Tested:
@@ -114,27 +122,24 @@ class Tested:
     statistic: float
     chance: float
 
+    @property
+    def evidence(self) -> float:
+        """The statistic less what the cause costs: its unknowns, its size beside that of such errors (Cauchy), its shape."""
+        size = float(np.linalg.norm(self.amount)) * self.cause.largest / _PLAUSIBLE[self.cause.quantity]
+        cost = _COST * len(self.amount) + 2.0 * float(np.log1p(size**2))
+        return self.statistic - cost - (_UNUSUAL if self.cause.kind == "other" else 0.0)
+
 
 def causes(fit: SolvedFit) -> list[DataWarning]:
-    """Name the cause that explains most of the residuals, with those it cannot be told from; nothing if none is significant."""
+    """Name the likeliest cause, with those it cannot be told from; nothing if none is significant."""
     if fit.inliers.sum() < _LEAST_PAIRS or fit.measurements.flat:
         return []
     tested = tested_causes(fit)
-    significant = [test for test in tested if test.chance < LEVEL]
-    best = max(
-        significant, key=lambda test: test.statistic - _COST * len(test.amount) - test.cause.rarity, default=None
-    )
-    if best is None:
+    if not any(test.chance < LEVEL for test in tested):
         return []
-    beside = [
-        test
-        for test in tested
-        if test is not best
-        and not test.cause.split
-        and test.statistic > best.statistic - _BESIDE
-        and len(test.amount) == 1
-    ]
-    beside.sort(key=lambda test: -test.statistic)
+    best = max(tested, key=lambda test: test.evidence)
+    beside = [test for test in tested if not test.cause.split and test.evidence > best.evidence - _BESIDE]
+    beside = sorted((test for test in beside if test is not best), key=lambda test: -test.evidence)
     return [_warning(fit, best, [] if best.cause.split else beside)]
 
 
@@ -247,6 +252,7 @@ def _constant_causes(fit: SolvedFit, order: Indices) -> Iterator[Cause]:
     for quantity in columns:
         for shape, factor in factors.items():
             if (quantity, shape) not in _ABSORBED:
+                factor = polar[0] if quantity == shape == "range" else factor  # the range's scale itself
                 largest = float(factor[np.abs(factor).argmax()])
                 yield Cause(quantity, shape, (columns[quantity] * factor[:, None])[:, :, None], largest)
     camera = fit.measurements.camera

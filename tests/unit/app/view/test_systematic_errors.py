@@ -93,7 +93,8 @@ def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calib
 
 
 def test_a_calibration_from_a_file_looks_the_same(calibration, flat):
-    for one in (calibration, flat):
+    for solved_here in (calibration, flat):
+        one = replace(solved_here, next_placement=None)  # a file holds none
         read = read_calibration(calibration_text(one)).calibration
         assert systematic_errors(read) == systematic_errors(one)
         assert summary_lines(read) == summary_lines(one)
