@@ -162,7 +162,7 @@ def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> N
     everything = solved.value(names)
     for words, first, others in (
         ("nuscenes", "nuscenes", set()),
-        ("rig", "driveworks", set()),
+        ("pjl", "pjlab", set()),
         ("ros 2", "tf2", {"urdf", "autoware"}),
         ("ros2", "tf2", {"tf2-launch-py"}),
     ):

@@ -138,6 +138,16 @@ def test_a_rig_that_cannot_be_understood_is_refused_in_words(file, change, words
         read_any(json.dumps(rig), "rig.json")
 
 
+def test_sensors_calibration_takes_the_first_key_and_carries_a_radar_point_into_the_camera(file, expected_m):
+    root = json.loads(text_of(file, "pjlab"))
+    for first in (next(iter(root)), min(root)):  # in the file's order, and sorted as some JSON libraries do
+        data = root[first]["param"]["sensor_calib"]["data"]
+        extrinsic = np.array([[data[row][column] for column in range(4)] for row in range(4)])
+        np.testing.assert_allclose((extrinsic @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
+    assert next(iter(root)) == "radar-to-camera_optical-extrinsic"
+    assert (root[next(iter(root))]["sensor_name"], len(root)) == ("radar", 1)
+
+
 def test_camera_info_is_loaded_as_ros_does_and_by_camera_option(file):
     text = export(file, "camera-info").data.decode()
     info = yaml.safe_load(text)

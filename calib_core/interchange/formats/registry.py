@@ -26,6 +26,7 @@ from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RADAR_OFFSET, KALIBR_CHAIN, KITTI_CAMERAS
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.pjlab import PJLAB
 from calib_core.interchange.formats.static_transform import TF2, TF2_LAUNCH_PY
 from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.formats.urdf import URDF
@@ -48,6 +49,7 @@ FORMATS: tuple[Format, ...] = (
     KITTI,
     NUSCENES,
     DRIVEWORKS,
+    PJLAB,
     COLMAP,
     MATLAB,
     MATRIX,
@@ -61,7 +63,7 @@ CAMERA_ONLY: tuple[Format, ...] = (CAMERA_INFO,)
 # one, and the formats are tried in the order above; where two could fit, the more specific one is tried first.
 _OURS = (CALIBRATION_1, TRUTH)
 _TRIED_FIRST = (
-    DRIVEWORKS,  # JSON only
+    *(PJLAB, DRIVEWORKS),  # JSON only
     NUSCENES,  # takes any JSON list
     *(OPENCV, APOLLO, KALIBR, AUTOWARE),  # YAML, JSON or FileStorage
 )

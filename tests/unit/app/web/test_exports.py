@@ -163,7 +163,7 @@ def test_the_image_is_that_of_the_pair_it_was_chosen_from(file):
     assert export_preview(replace(file, check_point=None), "tf2", "", "drive").check_point is None
 
 
-@pytest.mark.parametrize("key", ["json", "tf2", "urdf", "autoware", "opencv", "matlab"])
+@pytest.mark.parametrize("key", ["json", "tf2", "urdf", "autoware", "opencv", "matlab", "pjlab"])
 def test_the_names_of_the_query_are_those_in_the_file(file, key):
     written = exported(file, key, "radar_frame=front_radar&camera_frame=%2Ffront%2Fcamera_optical")
     assert read_any(written.data).frames == FrameNames("front_radar", "front/camera_optical")
