@@ -60,8 +60,3 @@ def direction_by_facing(rotation: Matrix33) -> Direction | None:
     }
     fitting = [direction for direction, cosines in looks.items() if min(cosines) > _FACING]
     return fitting[0] if len(fitting) == 1 else None
-
-
-def pinhole_matrix(fx: float, fy: float, cx: float, cy: float) -> tuple[float, ...]:
-    """Return the camera matrix, row by row, for focal lengths and principal point [px]."""
-    return (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)

@@ -19,6 +19,7 @@ _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
     "Camera_Matrix": ("Distortion_Coefficients",),
     "cameraMatrix": ("distCoeffs",),
+    "CameraMat": ("DistCoeff",),
     "mtx": ("dist", "dist_coeffs", "distortion"),
     "intrinsic_matrix": ("distortion", "distortion_coefficients"),
     "K": ("D",),
@@ -39,7 +40,7 @@ def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamer
         return (ours,)
     kalibr = [key for key, value in content.items() if isinstance(value, Mapping) and "intrinsics" in value]
     if kalibr:
-        return tuple(found_or_refused(key, partial(_kalibr_camera, key, content[key], source=source)) for key in kalibr)
+        return tuple(found_or_refused(key, partial(kalibr_camera, key, content[key], source=source)) for key in kalibr)
     for matrix_key, distortion_keys in _MATRIX_KEYS.items():
         if matrix_key in content:
             return (_flat_camera(content, matrix_key, distortion_keys, source=source),)
@@ -94,7 +95,7 @@ def _flat_camera(
 ) -> FoundCamera:
     """Read the flat layouts, which have matrix, distortion and size at one level: ROS, OpenCV, CameraInfo."""
     distortion = next((content[key] for key in distortion_keys if content.get(key) is not None), ())
-    model = str(content.get("distortion_model") or content.get("model") or "")
+    model = str(content.get("distortion_model") or content.get("model") or content.get("DistModel") or "")
     if str(content.get("fisheye_model", "0")).lower() in ("1", "true"):
         model = "fisheye"
     coefficients = floats(distortion, source=source, place=distortion_keys[0])
@@ -138,7 +139,12 @@ def _named_numbers(content: Mapping[str, Any], *, source: str) -> FoundCamera:
     )
 
 
-def _kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundCamera:
+def kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundCamera:
+    """Read a camera of Kalibr's chain by its key.
+
+    Raises:
+        InputError: it is no pinhole, or a number is missing.
+    """
     if block.get("camera_model", "pinhole") != "pinhole":
         raise InputError(
             f"{source}: {key}.camera_model: {block['camera_model']!r} is not supported; "

@@ -1,13 +1,14 @@
 """Calibrations of Autoware.AI's camera-lidar calibrators: CameraExtrinsicMat and CameraMat in OpenCV's FileStorage."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
-from calib_core.interchange.cameras.fields import floats, lens_model_named
+from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.pose_parts import direction_by_facing, rigid_rows
 from calib_core.interchange.syntax.content import Content
@@ -50,17 +51,10 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 
 
 def _camera(values: Mapping[str, Any], *, source: str) -> FoundCamera | None:
-    if "CameraMat" not in values:
-        return None
     size = values.get("ImageSize") or ()
     size = floats(size.split() if isinstance(size, str) else size, source=source, place="ImageSize")
-    return FoundCamera(
-        name="CameraMat",
-        model=lens_model_named(str(values.get("DistModel") or ""), source=source),
-        matrix_px=floats(values["CameraMat"], source=source, place="CameraMat", length=9),
-        distortion=floats(values.get("DistCoeff") or (), source=source, place="DistCoeff"),
-        size_px=(int(size[0]), int(size[1])) if len(size) == 2 and all(size) else None,
-    )
+    size_px = (int(size[0]), int(size[1])) if len(size) == 2 and all(size) else None
+    return next((replace(camera, size_px=size_px) for camera in find_cameras(values, source=source)), None)
 
 
 AUTOWARE_AI = Reads(_recognizes, _read)

@@ -7,9 +7,8 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera, with_camera
-from calib_core.interchange.cameras.fields import floats, lens_model_named
+from calib_core.interchange.cameras.fields import floats, kalibr_camera
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.pose_parts import pinhole_matrix
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "T_lidar_camera"
@@ -54,15 +53,8 @@ def _camera(block: Any, *, source: str) -> tuple[FoundCamera | None, tuple[str, 
     model = str(block.get("camera_model") or "")
     if model not in _MODELS:
         return None, (f"the camera model {model!r} is not supported and was left out",)
-    intrinsics = floats(block["intrinsics"], source=source, place="camera.intrinsics", length=4)
-    camera = FoundCamera(
-        name="camera",
-        model=lens_model_named(model, source=source),
-        matrix_px=pinhole_matrix(*intrinsics),
-        distortion=floats(block.get("distortion_coeffs", ()), source=source, place="camera.distortion_coeffs"),
-        size_px=None,
-    )
-    return camera, ()
+    pinhole = {**block, "camera_model": "pinhole", "distortion_model": model}
+    return kalibr_camera("camera", pinhole, source=source), ()
 
 
 KOIDE3 = Reads(_recognizes, _read)

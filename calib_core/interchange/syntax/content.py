@@ -17,7 +17,7 @@ Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, other bytes, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
-_LABEL = re.compile(r"\s*(?P<name>[A-Za-z]\w*)\s*[:=]")
+_BLOCK = re.compile(r"^\s*([A-Za-z]\w*)\s*[:=]((?:[\s\[\](),;]*[-+]?\.?\d[\d.eE+-]*)+)", re.MULTILINE)
 _SIZES_OF_POSES = (9, 12, 16)
 _NO_JSON = re.compile(
     r"\s*(\[(DEBUG|INFO|WARN|ERROR|FATAL)\]|\{\s*')"
@@ -116,7 +116,7 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
             if source.lower().endswith((".yaml", ".yml")):
                 raise
             blocks = _labeled_numbers(text)
-            if any(sum(map(len, rows)) in _SIZES_OF_POSES for rows in blocks.values()):
+            if any(len(numbers) in _SIZES_OF_POSES for numbers in blocks.values()):
                 yield Content("yaml", text=text, value=blocks)
                 return
             why = str(error).removeprefix(f"{source}: ")
@@ -124,20 +124,9 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
         yield Content("yaml", text=text, value=joined_documents(documents, source=source), documents=documents)
 
 
-def _labeled_numbers(text: str) -> dict[str, list[list[float]]]:
-    """Return the rows of numbers beside and below each name, as MATLAB and terminals print R and t; the first of a name."""
-    found: dict[str, list[list[float]]] = {}
-    name = ""
-    for line in re.split(r"[\n;]", text.replace("...", "")):
-        label = _LABEL.match(line)
-        if label:
-            name = "" if label["name"] in found else label["name"]
-        words = re.sub(r"[\[\](),]", " ", line[label.end() :] if label else line).split()
-        try:
-            row = [float(word) for word in words]
-        except ValueError:
-            name = ""
-            continue
-        if name and row:
-            found.setdefault(name, []).append(row)
-    return found
+def _labeled_numbers(text: str) -> dict[str, list[str]]:
+    """Return the numbers beside and below each name, as MATLAB and terminals print R and t; the first of a name."""
+    blocks: dict[str, list[str]] = {}
+    for name, numbers in _BLOCK.findall(text.replace("...", "")):
+        blocks.setdefault(name, re.sub(r"[\[\](),;]", " ", numbers).split())
+    return blocks
