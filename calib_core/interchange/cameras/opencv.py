@@ -34,10 +34,6 @@ def _write_yaml(camera: Camera, name: str) -> str:
 OPENCV_YAML = CameraFormat("opencv", ".yml", _write_yaml, ending=HASH_TAG)
 
 
-def _is_npz(content: str | bytes) -> bool:
-    return isinstance(content, bytes) and content.startswith(b"PK") and b".npy" in content
-
-
 def _read_npz(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
     arrays = load_npz(unpack(content, source=source) if isinstance(content, bytes) else {}, source=source)
     values = {name: array.tolist() for name, array in arrays.items() if array is not None}
@@ -47,4 +43,4 @@ def _read_npz(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
     return cameras
 
 
-OPENCV_NPZ = OwnSyntax(_is_npz, _read_npz)
+OPENCV_NPZ = OwnSyntax(lambda data: isinstance(data, bytes) and data.startswith(b"PK") and b".npy" in data, _read_npz)

@@ -224,9 +224,9 @@ def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis |
     """
     first = hypotheses[0]
     tested = not (math.isnan(first.miss_px) and math.isnan(first.apart[0]))
-    as_named = not pose.hints.other and not contradicts_names(pose, first)
     blank = all(reading.is_identity for reading in pose.readings)
-    return first if first.fits and first.share >= _CLEAR and (tested or (as_named and not blank)) else None
+    as_named = not (blank or pose.hints.other or contradicts_names(pose, first))
+    return first if first.fits and first.share >= _CLEAR and (tested or as_named) else None
 
 
 def contradicts_names(pose: FoundPose, hypothesis: Hypothesis) -> bool:

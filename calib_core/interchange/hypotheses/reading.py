@@ -16,7 +16,6 @@ from calib_core.interchange.format import (
     WrittenPose,
     looks_like_camera,
     looks_like_lidar,
-    looks_like_radar,
     of_lidar,
 )
 from calib_core.interchange.formats.mat import MATLAB
@@ -97,8 +96,8 @@ class UnstatedFile:
 
 
 def _is_of_camera_alone(pose: FoundPose) -> bool:
-    other = any(looks_like_radar(name) or looks_like_lidar(name) for name in pose.names)
-    return not other and any(map(looks_like_camera, pose.names))
+    others = pose.hints.names_radar or any(map(looks_like_lidar, pose.names))
+    return not others and any(map(looks_like_camera, pose.names))
 
 
 def read_unstated(content: str | bytes, source: str = "calibration") -> UnstatedFile | None:

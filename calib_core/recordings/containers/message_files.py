@@ -16,8 +16,7 @@ def definition_beside(folder: Path, kind: str) -> str:
         text = "" if name in texts else _text(folder, name, standard=name != kind)
         if text:
             texts[name] = text if name == kind else f"\n{'=' * 80}\nMSG: {name}\n{text}"
-            package = name.partition("/")[0]
-            used = (one if "/" in one else f"{package}/{one}" for one in _USED.findall(text))
+            used = (one if "/" in one else f"{name.partition('/')[0]}/{one}" for one in _USED.findall(text))
             waiting += sorted({one.replace("/", "/msg/") for one in used} - {*waiting})
     return "".join(texts.values())
 
