@@ -92,7 +92,7 @@ def nearest_stamp(static: RadarScans, image_time: TimeNs) -> TimeNs:
     return TimeNs(int(static.times_ns[static.nearest(image_time)]))
 
 
-def window_around(static: RadarScans, radar_time: TimeNs, options: PaperOptions) -> RadarScans:
+def window_of(static: RadarScans, radar_time: TimeNs, options: PaperOptions) -> RadarScans:
     """Algorithm 1, line 4: take the returns of the 3 s around that stamp."""
     if options.window == "whole-second":
         second = int(radar_time) // NS_PER_S * NS_PER_S
@@ -182,7 +182,7 @@ def pair_as_printed(
     gap_s = abs(int(radar_time) - int(click.image_time)) / NS_PER_S
     if gap_s > options.locating.max_time_gap_s:
         return _nothing_static(click, options, gap_s)
-    window = window_around(static, radar_time, options.paper)
+    window = window_of(static, radar_time, options.paper)
     around = in_placement_range(window, placement, options.paper)
     if placement is not None and len(window.points_radar_m) and not len(around.points_radar_m):
         facts = {"returns": len(window.points_radar_m), "region_m": options.paper.region_m}

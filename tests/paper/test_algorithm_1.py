@@ -35,7 +35,7 @@ from calib_core.paper.algorithm_1 import (
     refined_on_all_pairs,
     solve_pairs_as_printed,
     static_returns_as_printed,
-    window_around,
+    window_of,
     z_score_inliers,
 )
 from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
@@ -184,7 +184,7 @@ def test_algorithm_1_line_3_leaves_a_click_far_from_any_scan_unpaired():
 
 def test_algorithm_1_line_4_takes_3_s_centred_on_the_nearest_stamp():
     scans = scans_of(*(scan_of(0.5 * i, [[4.0, 0.0, 0.0]]) for i in range(21)))
-    window = window_around(scans, at(5.0), AS_PRINTED)
+    window = window_of(scans, at(5.0), AS_PRINTED)
     assert [(time - START_NS) / NS_PER_S for time in window.times_ns.tolist()] == [3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 6.5]
 
 
@@ -193,7 +193,7 @@ def test_algorithm_1_line_4_can_take_the_authors_window_around_the_whole_second(
     times = [second * NS_PER_S + round(0.25 * i * NS_PER_S) for i in range(40)]
     scans = RadarScans.from_scans([replace(scan_of(0.0, [[4.0, 0.0, 0.0]]), time=TimeNs(time)) for time in times])
     chosen = TimeNs((second + 5) * NS_PER_S + 750_000_000)
-    window = window_around(scans, chosen, replace(AS_PRINTED, window="whole-second"))
+    window = window_of(scans, chosen, replace(AS_PRINTED, window="whole-second"))
     assert window.times_ns[0] == (second + 4) * NS_PER_S
     assert window.times_ns[-1] == (second + 6) * NS_PER_S
 

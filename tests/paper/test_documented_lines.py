@@ -41,7 +41,7 @@ def test_every_line_of_algorithm_1_cites_itself():
         1: calib_core.paper.algorithm_1.clicks_by_time,
         2: calib_core.paper.algorithm_1.static_returns_as_printed,
         3: calib_core.paper.algorithm_1.nearest_stamp,
-        4: calib_core.paper.algorithm_1.window_around,
+        4: calib_core.paper.algorithm_1.window_of,
         5: calib_core.paper.algorithm_1.z_score_inliers,
         6: calib_core.paper.algorithm_1.mean_position,
         7: calib_core.paper.algorithm_1.pose_by_iterative_ransac,

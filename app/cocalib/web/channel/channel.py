@@ -130,7 +130,7 @@ class Channel:
         self.outbox.put(self._view_text, kind="view")
 
     def refresh(self) -> None:
-        """Draw again, after a change of the session or once the 3D view is connected."""
+        """Draw again: cursor or session have changed, or the 3D view is connected. A page that plays shows no candidates."""
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
         if not self._cursor.playing:
