@@ -11,6 +11,7 @@ from calib_core.arrays import Matrix33, Matrix66, Points3, Values, Vector3, free
 OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), (3, 3))
 """Rotation from body axes (x forward, y left, z up) to a camera's optical axes (x right, y down, z forward)."""
 
+CM_PER_M = 100.0
 _SMALL_ANGLE_RAD = 1e-6
 _ROTATION_TOLERANCE = 1e-6
 _ROUNDED = 1e-12
@@ -281,8 +282,8 @@ def pose_difference(first: RigidTransform, second: RigidTransform, covariance: M
         error=error,
         rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
         rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),
-        position_cm=float(np.linalg.norm(moved_m)) * 100.0,
-        position_sigma_cm=_sigma_along(moved_m, jacobian @ covariance @ jacobian.T) * 100.0,
+        position_cm=float(np.linalg.norm(moved_m)) * CM_PER_M,
+        position_sigma_cm=_sigma_along(moved_m, jacobian @ covariance @ jacobian.T) * CM_PER_M,
         squared=squared_distance(error, covariance),
     )
 

@@ -136,6 +136,7 @@ def too_near(position_radar_m: Sequence[float] | np.ndarray) -> str:
     range_m = float(np.linalg.norm(position_radar_m))
     if not range_m < NEAREST_RETURN_M:
         return ""
+    # millimeters per meter
     where = "at the radar's origin" if range_m == 0.0 else f"{1000.0 * range_m:.3g} mm from the radar's origin"
     return f"is {where}, which cannot be a return; remove the pair, or give positions in metres"
 

@@ -31,11 +31,12 @@ CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
 
 _REACH = 2.0  # steps from a cluster's centre to its farthest member
 _NEIGHBOURS = 1.5  # steps between cells whose masses add up
-_MEAN_SHIFTS = 3
-_MOST_CELLS = 400
-_CLUSTERS_PER_CANDIDATE = 3
-_LEAST_RELATIVE_SCORE = 0.001
+_MEAN_SHIFTS = 3  # steps toward the mean of what is near: a choice, as each takes all returns
+_MOST_CELLS = 400  # number of cells, of which all distances are taken: the lightest are left out to save time
+_CLUSTERS_PER_CANDIDATE = 3  # number of clusters scored for each candidate kept: a choice; more take longer
+_LEAST_RELATIVE_SCORE = 0.001  # share of the best one's score; less plausible ones only take time (a choice)
 _KEPT_SHARE = 0.99  # of the score of a window
+_MOST_CACHED = 512  # number of windows, clicked and background: a choice between memory and time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +119,7 @@ def clusters_of(window: RadarScans, *, most: int, scale: Vector3 = CLUSTER_SCALE
     return _found_clusters(_WindowKey.of(window), most, tuple(scale.tolist()))
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=_MOST_CACHED)
 def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tuple[Cluster, ...]:
     window, step = key.window, np.array(scale)
     steps = direction_cosines(window.points_radar_m) / step
@@ -183,6 +184,7 @@ def _amplitudes(snr_db: Values) -> Values:
     if not np.isfinite(snr_db).any():
         return np.ones(len(snr_db))
     known = np.where(np.isfinite(snr_db), snr_db, np.nanmedian(snr_db))
+    # 20 dB are a factor of 10 in amplitude; the weakest returns count as 60 dB below the strongest
     return np.asarray(10.0 ** np.clip((known - known.max()) / 20.0, -3.0, 0.0))
 
 
@@ -304,22 +306,23 @@ def _cosines(position_radar_m: Vector3) -> Vector3:
     """Return d(range, u, w) / d(range, azimuth, elevation) on the diagonal, at least 0.2."""
     x, y, _ = position_radar_m
     across = float(np.hypot(x, y))
-    range_m = max(float(np.linalg.norm(position_radar_m)), 1e-9)
-    return np.array([1.0, max(abs(x) / range_m, 0.2), max(across / range_m, 0.2)])
+    range_m = max(float(np.linalg.norm(position_radar_m)), 1e-9)  # [m]: at the origin, no division by 0
+    # factor of at most 5 on the angles' sigma, about 78 deg off the axis; beyond, 1 / cos grows without limit (a choice)
+    return np.asarray(np.maximum([1.0, abs(x) / range_m, across / range_m], 0.2))
 
 
 _LARGEST = 5.0  # times CLUSTER_SCALE
 _STEPS_PER_SIGMA = 1.75  # a cluster reaches two steps, so three and a half standard deviations
-_STEPS_PER_BIN = 0.6  # so that a cluster holds two neighbouring bins
+_STEPS_PER_BIN = 0.6  # steps, so that a cluster holds two neighbouring bins
 _WITHIN = 8.0  # steps from a return to the same object's in the next scan
-_MOST_SCANS = 200
-_LEAST_SCANS = 4  # of each window
-_LEAST_DIFFERENCES = 30
+_MOST_SCANS = 200  # number of scans compared with the next one, of all windows: a median of these is enough (a choice)
+_LEAST_SCANS = 4  # scans of each window, where many windows share that number
+_LEAST_DIFFERENCES = 30  # number of differences, below which a median is not trusted (a choice)
 _MEDIAN_OF_DIFFERENCE = 0.954  # of two normal values, in their standard deviation
 _ROUNDING = 0.01  # steps
 _LEAST_SPREAD = 0.05  # steps: a radar without elevation shows no scatter there, but rounding
 _LEAST_UNCHANGED = 0.2  # share of the differences, for values on a lattice
-_LEAST_CHANGES = 10
+_LEAST_CHANGES = 10  # number of differences that a bin's width is the lower quartile of (a choice)
 
 
 def cluster_scale(windows: Sequence[RadarScans]) -> Vector3:
@@ -356,7 +359,7 @@ def report_spread(scans: RadarScans) -> Vector3 | None:
     return np.asarray(CLUSTER_SCALE * np.maximum(np.maximum(2.0 * _STEPS_PER_SIGMA * scatter, bins), _LEAST_SPREAD))
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=_MOST_CACHED)
 def _kept_differences(key: _WindowKey, most: int) -> Points3:
     return _differences(key.window, most)
 
@@ -389,4 +392,4 @@ def _bin_width(differences: Values) -> float:
     unchanged = len(differences) - len(changed)
     if unchanged < _LEAST_UNCHANGED * len(differences) or len(changed) < _LEAST_CHANGES:
         return 0.0
-    return float(np.quantile(changed, 0.25))
+    return float(np.quantile(changed, 0.25))  # quantile: larger changes are of several bins (a choice)

@@ -313,11 +313,10 @@ def no_chosen_return(click: ReflectorClick) -> Unpaired:
 
 
 _LEAST_SCORE = 0.05  # relative to the best of the pair
-_LEAST_PAIRS = 4
+_LEAST_PAIRS = 4  # with one offset: fewer share one by chance (a choice)
 _LEAST_SHARE = 0.6  # of the pairs
-_SAME_OFFSET_M = 0.25
-_LEAST_OFFSET_M = 0.3
-_MOST_OFFSET_M = 4.0
+_SAME_OFFSET_M = 0.25  # a choice: a few range bins wide, and less than the least offset
+_LEAST_OFFSET_M, _MOST_OFFSET_M = 0.3, 4.0  # a choice: nearer ones are the reflector's own, farther ones no cart
 _MOST_ASIDE = 4.0  # steps in u: behind the reflector, not next to it
 _NEARER = 1.5  # how much more plausible the nearer one is, in each pair
 
@@ -417,10 +416,10 @@ def _balanced(candidates: tuple[Candidate, ...], near: int, far: int) -> tuple[C
 
 
 _SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
-_FLOOR = 1e-6
+_FLOOR = 1e-6  # least factor on a score: 16 windows or more that all show a place count alike
 _LISTED_FIRST = 3.0  # how much likelier the position that the radar lists first is than another of the same return
 _PSEUDO_EMPTY = 0.5  # windows, so that a few windows that all show a place do not rule it out
-_MOST_BACKGROUND = 16
+_MOST_BACKGROUND = 16  # number of windows without clicks: clustering more takes longer (a choice)
 _LEAST_SCANS = 2
 
 
@@ -514,4 +513,5 @@ def _novelty(
         seen = np.array([seen[rows].min(axis=0) for rows in alternatives])
     empty = others.sum() - seen[:, others[filled]].sum(axis=1)
     share = (np.maximum(empty, 0.0) + _PSEUDO_EMPTY) / (others.sum() + _PSEUDO_EMPTY)
+    # a choice of the power: what is seen in half of the other windows loses a factor of 16
     return np.asarray(np.maximum(share**4, _FLOOR))

@@ -86,6 +86,7 @@ class Dwell:
     def weight(self) -> float:
         """Rank among simultaneous dwells: strength, presence and duration [dB]."""
         lasted_s = (self.end - self.start) / NS_PER_S
+        # decibels of a power: the echoes of all scans add up [dB]
         return self.strength_db + float(10.0 * np.log10(self.presence * lasted_s))
 
 
@@ -274,12 +275,12 @@ _LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
 _SEED_GAP_S = 1.2  # within one cell, because the returns may alternate between neighbouring cells
 _SEED_SHARE_OF_DWELL = 0.5
 _LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
-_MOST_PRESENCE_OUTSIDE = 0.25  # the same for the rest of the recording, relative to the dwell's
+_MOST_PRESENCE_OUTSIDE = 0.25  # the same share of the other scans, relative to the dwell's
 _MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene, unless a piece of the recording does not show it
 _BETWEEN_PIECES_S = 2.0  # without scans: another bag, in which the reflector stands elsewhere
 _MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
 _BEFORE_S = (0.5, 1.5)  # before a dwell's start, or after its end: scans there show that it had not begun
-_MOST_SEEDS = 4000
+_MOST_SEEDS = 4000  # number of runs tried, those in the most scans first: a choice that bounds the time of a search
 
 
 def find_dwells(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float) -> list["Dwell"]:
@@ -377,12 +378,11 @@ class _Grid:
 
 
 _NEIGHBOURS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
-_U_CELLS = 64  # u and w lie in -1 to 1: 51 and 26 cells, and a margin for neighbours
-_W_CELLS = 64
+_CELLS = 64  # number of cells along u or w, which lie in -1 to 1: 51 and 26, and a margin for neighbours
 
 
 def _keys(cells: Indices) -> Indices:
-    return (cells[..., 0] * _U_CELLS + cells[..., 1] + _U_CELLS // 2) * _W_CELLS + cells[..., 2] + _W_CELLS // 2
+    return (cells[..., 0] * _CELLS + cells[..., 1] + _CELLS // 2) * _CELLS + cells[..., 2] + _CELLS // 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -487,6 +487,7 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         presence_outside=presence_outside,
         snr_db=mean_db,
         fading_db=_fading_db(grid.scan[mine], snr_db),
+        # radar equation: power falls with the fourth power of the range [dB]; at 0 m it has no logarithm
         strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
         reach=grid.reach,
         begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
@@ -520,20 +521,17 @@ def _any_within(times_s: Values, first_s: float, last_s: float) -> bool:
 _STRONG_QUANTILE = 0.75
 """Of a dwell's echoes: what is much weaker than these at other times is not the same thing, and hides nothing."""
 
-_OUTSHONE_DB = 6.0
-
-_WEAKER_SCATTERS = 4.0
+_OUTSHONE_DB, _WEAKER_SCATTERS = 6.0, 4.0
 """How far below the dwell's median an echo is weak: in decibels at least, and in standard deviations of its echoes."""
 
 _LONGEST_END_S = 1.2
 """What is weak for longer is a dwell whose echo changes, not an end."""
 
-_AT_END_S = 0.45
-
-_STRONG_SHARE = 0.5
-"""How many scans in the last moments are strong, relative to the whole dwell."""
+_AT_END_S, _STRONG_SHARE = 0.45, 0.5
+"""The last moments, about five scans at 10 Hz, and the share of their scans that is strong, relative to the whole dwell's."""
 
 _FEW = 5
+"""Number of scans with an echo of known strength, of fewer than which no median or scatter is taken (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -556,6 +554,7 @@ def firm_span(times_s: Values, snr_db: Values) -> FirmSpan:
     if len(known) < _FEW:
         return FirmSpan(0, last)
     median_db = float(np.median(known))
+    # standard deviation of normal values over their median absolute deviation
     scatter_db = 1.48 * float(np.median(np.abs(known - median_db)))
     strong = np.nan_to_num(snr_db, nan=-np.inf) >= median_db - max(_OUTSHONE_DB, _WEAKER_SCATTERS * scatter_db)
     first = _first_firm(times_s - times_s[0], strong)

@@ -23,15 +23,17 @@ from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesia
 from calib_core.results import Calibration, PairResult
 
 _LEAST_PAIRS = 8
+"""Fewer show little of a smooth error beside the pose's six unknowns (a choice)."""
+
 _MOST_PAIRS = 120
 """Beyond this many the pairs are thinned out, because neighbors are redundant."""
 
+# l of (7) in ratios of about sqrt(2): an array's errors change over a part of its field of view (a choice)
 _LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
-_SMOOTH_RAD = np.deg2rad([0.0, 0.2, 0.4, 0.8, 1.6, 3.2])
-_INDEPENDENT_RAD = np.deg2rad([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
-_IMPROBABLE = 1e-3  # relative to the most likely
-_STEP_RAD = np.deg2rad(5.0)
-_BEYOND_RAD = np.deg2rad(10.0)
+_SMOOTH_RAD = np.deg2rad([0.0, *0.2 * 2.0 ** np.arange(5)])  # a of (7): none, and in factors of 2 (a choice)
+_INDEPENDENT_RAD = np.deg2rad(0.05 * 2.0 ** np.arange(6))  # s of (7) in factors of 2 (a choice)
+_IMPROBABLE = 1e-3  # share of the likeliest model's weight, below which one is left out to save time
+_STEP_RAD, _BEYOND_RAD = _LENGTHS_RAD[0] / 2, _LENGTHS_RAD[0]  # the map's lines and its margin, by the shortest length
 _ONE_PX = np.array([1.0, 0.0])
 _DECIMALS = 6
 """Decimals of the map [rad]: far finer than any radar, and compact in a file."""

@@ -30,16 +30,16 @@ from calib_core.measurements import Facts
 from calib_core.results import DataWarning
 
 LEVEL = 0.01  # probability that any cause is named in a sound set
-_LEAST_PAIRS = 10
+_LEAST_PAIRS = 10  # a choice: of 20 residuals the pose takes 6, and the estimated errors and the noise some
 _LEAST_LEFT = 0.05  # share of the residual's degrees of freedom that must stay unexplained
-_SMOOTH_RAD = np.deg2rad(14.0)
+_SMOOTH_RAD = np.deg2rad(14.0)  # correlation length, of those of `covariance` and `angle_map` (10 to 32 deg)
 _SMOOTH_VARIANCE, _SMOOTH_VARIANCE_OF_STEPS = 0.25, 4.0
 """Of angle errors that neighboring placements share, over the noise's. Steps are tested against twice the noise: placements that
 walk across the view turn one into the other."""
 _SHARES = {"turn": 0.3, "move": 0.05, "range step": 0.05, "stated": 0.3, "other": 0.3}
 """Of the level: of steps by their kind, of what has a prior, and of everything else."""
-_MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # tried; on each side
-_DIFFERENT = 0.25  # of the tests of a kind count: neighboring shapes and splits are nearly the same
+_MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # number of splits tried; pairs on each side of one (a choice)
+_DIFFERENT = 0.25  # share of the tests of a kind that count: neighboring shapes and splits are nearly the same
 _COST = 2.0  # of the statistic, for each unknown of a cause (Akaike)
 _PLAUSIBLE: Mapping[str, float] = {
     "range": 0.5,
@@ -71,6 +71,7 @@ _SHAPES: Mapping[str, Shape] = {
     "elevation^2": lambda polar: polar[2] ** 2,
     "azimuth^3": lambda polar: polar[1] ** 3,
 }
+"""Up to the third power, in which a sine that is taken for its angle differs from it [rad]."""
 _OF_RADAR, _OF_CLICKS, _OF_LENS = ("range", "azimuth", "elevation"), ("column", "row"), ("focal length", "distortion")
 _PRIORS: Mapping[tuple[str, str], str] = {
     ("range", ""): "range_bias_m",
@@ -230,7 +231,7 @@ class _Null:
         )
 
 
-_LEAST_OWN = 1e-6  # of a column that is left beside pose and estimated errors
+_LEAST_OWN = 1e-6  # share of a column that is left beside pose and estimated errors; less may be rounding
 
 
 def _chance(statistic: float, freedom: float, count: float) -> float:

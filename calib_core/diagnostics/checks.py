@@ -21,17 +21,17 @@ from calib_core.estimation.alternative_poses import NARROW_CONDITION
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import implausible_input
+from calib_core.geometry import CM_PER_M
 from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.results.systematic_errors import scaled_angles
+from calib_core.results.verdict import SURE_PAIRS
 
-_WEAK_ROTATION_RAD = np.deg2rad(2.5)
-_WEAK_POSITION_M = 0.3
-_NOISE_EXCESS = 2.5
-_FEW_INLIERS = 8
-_MANY_PLACES = 500  # of more, neighbors come from a tree: all distances would take too long
+_WEAK_ROTATION_RAD, _WEAK_POSITION_M = np.deg2rad(2.5), 0.3  # standard deviations, beyond what is usable (a choice)
+_NOISE_EXCESS = 2.5  # ratio of the residuals' variance to the assumed one: 1.6 times its standard deviation (a choice)
+_MANY_PLACES = 500  # number of places: of more, neighbors come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers")
 _TOLD_BY_MORE = (
     "handedness-assumed",
@@ -93,15 +93,15 @@ def without_consequences(warnings: Sequence[DataWarning]) -> tuple[DataWarning, 
 def _counted_up(warnings: list[DataWarning], inliers: Flags) -> list[DataWarning]:
     """With few pairs, say how many there are instead of what only more of them can tell."""
     count = int(inliers.sum())
-    if count >= _FEW_INLIERS:
+    if count >= SURE_PAIRS:
         return warnings
-    if len(inliers) >= max(_FEW_INLIERS, 2 * count):
+    if len(inliers) >= max(SURE_PAIRS, 2 * count):
         return [
             DataWarning("no-consensus", {"agreeing": count, "pairs": len(inliers)}),
             *warnings,
         ]
     clear = bool(inliers.all()) and not any(warning.code in _UNCLEAR for warning in warnings)
-    few = DataWarning("few-pairs", {"agreeing": count, "pairs": len(inliers), "needed": _FEW_INLIERS, "clear": clear})
+    few = DataWarning("few-pairs", {"agreeing": count, "pairs": len(inliers), "needed": SURE_PAIRS, "clear": clear})
     return [*(warning for warning in warnings if warning.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
 
 
@@ -126,13 +126,14 @@ def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
 
 def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
     outliers = [name for name, inlier in zip(fit.ids, fit.inliers, strict=True) if not inlier]
-    if len(outliers) <= 0.35 * len(fit.ids):
+    if len(outliers) <= 0.35 * len(fit.ids):  # share of the pairs, as docs/warnings.md states (a choice)
         return []
     return [DataWarning("many-outliers", {"ids": outliers, "pairs": len(fit.ids)})]
 
 
 def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
     degrees = 2 * int(fit.inliers.sum()) - 6
+    # chi2 per degree has the standard deviation sqrt(2 / degrees): four of them are no chance
     if degrees < 6 or fit.chi2_per_degree < 1.0 + 4.0 * np.sqrt(2.0 / degrees) or fit.chi2_per_degree < _NOISE_EXCESS:
         return []
     return [DataWarning("residuals-too-large", {"chi2_per_degree": fit.chi2_per_degree})]
@@ -162,7 +163,7 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
             "weak-geometry",
             {
                 "rotation_deg": float(np.rad2deg(rotation_rad)),
-                "position_cm": 100.0 * position_m,
+                "position_cm": CM_PER_M * position_m,
                 "nearest_m": float(range_m.min()),
                 "farthest_m": float(range_m.max()),
                 "azimuth_span_deg": float(np.rad2deg(np.ptp(azimuth_rad))),
@@ -189,7 +190,7 @@ def _places(fit: SolvedFit) -> int:
 
 def _same_places(fit: SolvedFit) -> list[DataWarning]:
     count, places = int(fit.inliers.sum()), _places(fit)
-    if places > 0.7 * count:
+    if places > 0.7 * count:  # share of the pairs, as docs/warnings.md states (a choice)
         return []
     return [DataWarning("repeated-placements", {"pairs": count, "places": places})]
 
@@ -206,9 +207,9 @@ def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar
         return []
     pose, stated = refined.camera_from_radar, uncertainty.covariance
     firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, refined.placements_z_m, radar))
-    (forward, left), yaw = 100.0 * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
+    (forward, left), yaw = CM_PER_M * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
     assumed = sigma_in_radar_axes(pose, stated)
-    up, (roll, pitch) = 100.0 * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
+    up, (roll, pitch) = CM_PER_M * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
     return [
         DataWarning(
             "flat-radar",

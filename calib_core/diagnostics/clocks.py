@@ -32,14 +32,14 @@ from calib_core.results import Calibration, DataWarning, PairResult
 CLOCK_CODES = ("clock-bias-suspected",)
 """Codes of the warnings that need the recording: pairs alone cannot show them."""
 
-_LEAST_OUTSIDE = 3
+_LEAST_OUTSIDE = 3  # clicks: one or two may be mistimed themselves (a choice)
 _LEAST_SHARE = 0.25  # of the clicks with a dwell: those outside it
-_MOST_OTHER_SIDE = 0.1  # of those outside: those to the other side
+_MOST_OTHER_SIDE = 0.1  # share of those outside that is to the other side
 _TOLERANCE_S = 0.3  # the reflector is being put down, or one or two scans miss it
 _LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
 _SHORTEST_DWELL_S = 0.5
 _REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
-_STEP_S = 0.05
+_STEP_S = 0.05  # between the offsets tried: half the time between scans at 10 Hz
 _AROUND_S = 4.0  # as far as the scans around a click reach by default
 _MOST_STEPS = 3  # placements tried where the pose may be turned, which takes a fit each
 _MOST_CHEAP_STEPS = 20  # where it is not: the longest row
@@ -49,15 +49,15 @@ _SCALES_APART_S = (
 """The likeliest last: of those that fit alike, the last is named."""
 _WITHIN_DWELL_S = 4.0  # a reflector that stands still as long as it is asked to has stood for this long about a click
 _LEAST_APART = 2
-_LEAST_AGREEING = 8
-_AGREEING_SHARE = 0.7
+_LEAST_AGREEING = 8  # clicks, and a share of those shifted: less may agree with some pose by chance (a choice)
+_AGREEING_SHARE = 0.7  # the ends of rows have no such placement, and wrong pairs disagree (a choice)
 _SOUND_SHARE = 0.6  # a pose with which more pairs agree than this, no noisier, may be off by a step, but is not turned
 _SOUND_NOISE = 1.8  # times the assumed one
 _MORE_AGREEING = 2
 _LARGEST_NOISE = 2.5  # times the assumed one; pairs that agree by chance reach 5
-_SHIFT_ROUNDS = 8
-_LEAST_ANGLE_RAD = np.deg2rad(0.1)
-_NEAR_RAD = np.deg2rad(4.0)
+_SHIFT_ROUNDS = 8  # steps of reweighted least squares (Weiszfeld); a count of pairs needs no exact shift
+_LEAST_ANGLE_RAD = np.deg2rad(0.1)  # added to each, so that no weight is infinite: less than a radar's noise
+_NEAR_RAD = np.deg2rad(4.0)  # wide of the noise, because too small a count would leave a right deal untried (a choice)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,11 +17,10 @@ from calib_core.geometry import camera_position_jacobian
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
 
-_PLANE_ROUNDS = 6
-_NORMAL_QUANTILE_99 = 2.33
+_PLANE_ROUNDS = 6  # steps of reweighting: variances along the normal change little once it is about right
+_NORMAL_QUANTILE_99 = 2.33  # standard deviations, rounded up
 _WRONG_SHARE = 0.1  # of the inliers
-_CLEAR_SIGMAS = 2.0  # of a height above the plane
-_VERY_CLEAR_SIGMAS = 3.0
+_CLEAR_SIGMAS, _VERY_CLEAR_SIGMAS = 2.0, 3.0  # of a height above the plane: of right and of mirrored axes (a choice)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,13 +147,13 @@ def _heights_decide(plane: _Plane) -> bool:
 
     Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
     that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
-    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure. The placements
+    2^2 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure. The placements
     farthest from the plane are left out: among them may be a wrong pair.
     """
     wrong = int(np.ceil(_WRONG_SHARE * len(plane.distances)))
     chi2 = float(np.sort(plane.distances)[: len(plane.distances) - wrong].sum())
-    limit = MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * plane.redundancy)
-    return bool(4.0 * (chi2 - plane.redundancy) > limit)
+    limit = MIRRORED_GAIN + 2.0**2 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * plane.redundancy)
+    return bool(2.0**2 * (chi2 - plane.redundancy) > limit)
 
 
 def _plane(fit: SolvedFit) -> _Plane:

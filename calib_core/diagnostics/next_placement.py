@@ -7,7 +7,7 @@ ranges.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, NextPlacement
 from calib_core.results.systematic_errors import SystematicErrors
 
-_ENOUGH_GAIN = 1.04  # a placement that gains less is not worth the effort
+_ENOUGH_GAIN = 1.04  # factor on the standard deviations; a placement that gains less is not worth the effort (a choice)
 _MARGIN_SHARE = 0.04  # of the image, kept free at its edges
 
 
@@ -105,7 +105,8 @@ def _design(used: Sequence[Pair], calibration: Calibration) -> _Design:
 
 def _free_places(calibration: Calibration, used: Points3, limits: PlacementLimits) -> Points3:
     """Return the points of a polar grid on the plane of the used places that both sensors see and that are not used yet."""
-    range_m = np.geomspace(limits.min_range_m, limits.max_range_m, 10)
+    range_m = np.geomspace(limits.min_range_m, limits.max_range_m, 10)  # steps of a quarter of the range, by default
+    # steps of 4 degrees by default: finer ones than people place a reflector by are no use
     azimuth_rad = np.deg2rad(np.linspace(-limits.max_azimuth_deg, limits.max_azimuth_deg, 21))
     grid = np.stack(np.meshgrid(range_m, azimuth_rad, indexing="ij"), axis=-1).reshape(-1, 2)
     flat = cartesian_from_polar(np.column_stack([grid, np.zeros(len(grid))]))
@@ -151,11 +152,11 @@ def _spread(variances: np.ndarray, distance_m: float) -> Values:
 ENOUGH_PLACEMENTS = 20
 """The number of placements that docs/tour.md advises to record."""
 
-_RANGES_M = ((2.0, 5.0), (5.0, 10.0), (10.0, 15.0))
+_RANGES_M = tuple(pairwise((2.0, 5.0, 10.0, 15.0)))  # near, middle, far of what docs/tour.md advises (a choice)
 _SIDES = ("left", "ahead", "right")
-_EDGE_SHARE = 1.0 / 3.0
+_EDGE_SHARE = 1.0 / 3.0  # of the half view: left, ahead and right are equally wide
 _SAME_PLACE_M = 0.5
-_TWO_HEIGHTS_M = 0.3
+_TWO_HEIGHTS_M = 0.3  # a smaller span is one height: less than a box under the reflector adds (a choice)
 
 
 @dataclass(frozen=True, slots=True)

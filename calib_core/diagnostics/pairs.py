@@ -7,7 +7,7 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.results import DataWarning
 
 _DECISIVE_LOSS = 8.0  # ratio of the standard deviations without and with the pair, in the worst direction
-_LEAST_PAIRS = 6
+_LEAST_PAIRS = 6  # three determine a pose, so of a few each decides something (a choice)
 
 
 def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
@@ -40,4 +40,5 @@ def _losses(fit: SolvedFit) -> Values:
     jacobian = refined.model.jacobian
     share = refined.weights[:, None, None] * (jacobian @ inverse @ np.swapaxes(jacobian, 1, 2))
     largest = np.linalg.eigvalsh(share)[:, -1]
+    # a share of the variance: what one pair alone determines loses a factor of 3e4, not infinity
     return np.asarray(np.where(fit.inliers, 1.0 / np.sqrt(np.maximum(1.0 - largest, 1e-9)), 0.0))

@@ -9,15 +9,14 @@ from calib_core.arrays import Indices, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import CM_PER_M, RigidTransform
 from calib_core.measurements import Facts
 from calib_core.results import DataWarning
 
-_ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
-_WORTH_REFINING = 40.0
+_ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood: a likelihood ratio of 20
+_WORTH_REFINING = 40.0  # the same of coarse poses: beyond a ratio of e^20, refining is not worth a fit (a choice)
 _AS_A_WHOLE = 12.0  # the same, of the posterior's other peaks and of pairs that were set aside
-_OTHER_POSE_SIGMAS = 6.0
-_OTHER_PEAK_SIGMAS = 4.0
+_OTHER_POSE_SIGMAS, _OTHER_PEAK_SIGMAS = 6.0, 4.0  # nearer ones are the same pose, as its covariance says (a choice)
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
@@ -35,7 +34,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
             continue
         away = {
             "away_deg": float(np.rad2deg(np.linalg.norm(error[3:]))),
-            "away_cm": 100.0 * _moved_m(fit, other),
+            "away_cm": CM_PER_M * _moved_m(fit, other),
             "sigmas": sigmas,
         }
         if min(other.cost - fit.best.found[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
@@ -151,7 +150,7 @@ def _away(error: Values) -> Facts:
     """Return how far a pose error (6,) is."""
     return {
         "away_deg": float(np.rad2deg(np.linalg.norm(error[3:]))),
-        "away_cm": 100.0 * float(np.linalg.norm(error[:3])),
+        "away_cm": CM_PER_M * float(np.linalg.norm(error[:3])),
     }
 
 
@@ -165,7 +164,7 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
     if position is None or position.chance >= _DOUBTFUL:
         return []
     facts = {
-        "away_cm": 100.0 * position.away_m,
+        "away_cm": CM_PER_M * position.away_m,
         "sigmas": position.sigmas,
         "misread": position.misread,
         "unit": position.unit,

@@ -42,6 +42,7 @@ class UncertaintyMap:
         freeze(self, semi_major_px=shape)
 
 
+# 48 steps across an image, 40 px of 1920: a pose's error changes slowly over an image (a choice)
 def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int = 49) -> UncertaintyMap:
     """Map the 95 % uncertainty of a reprojection over the image, for points at one distance from the camera.
 
@@ -83,8 +84,9 @@ def pixel_quantile(covariance_quantile: float) -> float:
         return CHI2_95_2
     from scipy.special import fdtri
 
+    # degrees of freedom of noise that is as good as known
     freedom = degrees_of_freedom(covariance_quantile, least=1.0, most=1e7)
-    return max(CHI2_95_2, 2.0 * float(fdtri(2.0, freedom, 0.95)))
+    return max(CHI2_95_2, 2.0 * float(fdtri(2.0, freedom, 0.95)))  # the probability of the ellipse
 
 
 def picture_sigma_px(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance) -> float:

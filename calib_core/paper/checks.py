@@ -13,7 +13,7 @@ from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.estimation.measurement_model import Linearization, linearize
 from calib_core.estimation.plausibility import implausible_input
-from calib_core.geometry import RigidTransform, camera_position_jacobian
+from calib_core.geometry import CM_PER_M, RigidTransform, camera_position_jacobian
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
@@ -149,7 +149,7 @@ def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarni
     return [
         DataWarning(
             "weak-geometry",
-            {"rotation_deg": float(np.rad2deg(rotation_rad)), "position_cm": 100.0 * position_m, "paper": True},
+            {"rotation_deg": float(np.rad2deg(rotation_rad)), "position_cm": CM_PER_M * position_m, "paper": True},
         )
     ]
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3, freeze, frozen_array
 from calib_core.camera import Camera, CameraCovariance
+from calib_core.geometry import CM_PER_M
 from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.options import CalibrationOptions, RadarOptions
@@ -508,7 +509,7 @@ def shared_out(mixed: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.asarray((mixed / scale @ whitened) ** 2)
 
 
-_DOMINANT_SHARE = 1.0 / 3.0
+_DOMINANT_SHARE = 1.0 / 3.0  # of the variance of position or rotation: knowing less gains less than 22 % (a choice)
 _UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
 _BEYOND = 3.0  # standard deviations of the prior
 
@@ -586,7 +587,7 @@ def dominant_errors(errors: Sequence[SystematicErrorResult], covariance: Matrix6
         most = max(shares, key=lambda name: shares[name][part], default="")
         if most and shares[most][part] >= _DOMINANT_SHARE:
             chosen.setdefault(most, [0.0, 0.0])[part] = shares[most][part]
-    position_cm = 100.0 * float(np.sqrt(np.trace(covariance[:3, :3])))
+    position_cm = CM_PER_M * float(np.sqrt(np.trace(covariance[:3, :3])))
     rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
     dominant = [
         DominantError(
@@ -625,8 +626,7 @@ def is_beyond_its_prior(error: SystematicErrorResult) -> bool:
     return error.estimated and 0.0 < _BEYOND * error.prior_sigma < abs(error.value)
 
 
-_CLEAR_SIGMAS = 3.0
-_NOTABLE_SCALE = 0.015
+_CLEAR_SIGMAS, _NOTABLE_SCALE = 3.0, 0.015  # and a share of the angle, as docs/warnings.md states (a choice)
 _LEAST_TOLD = 0.005  # share of the prior variance that the pairs must take away for an estimate of their own
 _SCALES = ("azimuth_scale", "elevation_scale")
 

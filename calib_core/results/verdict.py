@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.errors import in_words
-from calib_core.geometry import camera_position_jacobian
+from calib_core.geometry import CM_PER_M, camera_position_jacobian
 from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.results.actions import (
     Action,
@@ -73,18 +73,20 @@ def stated_error(calibration: Calibration) -> StatedError:
     known = bool(ranges_m) and bool(np.isfinite(image_px2).all())
     return StatedError(
         rotation_deg=_rounded_up(np.rad2deg(_radius(of_axes, freedom))),
-        position_cm=float("nan") if in_plane else _rounded_up(100.0 * position_m),
+        position_cm=float("nan") if in_plane else _rounded_up(CM_PER_M * position_m),
         image_px=_rounded_up(_radius(image_px2, freedom)) if known else float("nan"),
         range_m=float(np.median(ranges_m)) if known else float("nan"),
         in_plane=in_plane,
     )
 
 
+# degrees of freedom up to which noise is estimated; beyond, F is chi-square to four digits
 def degrees_of_freedom(quantile_95: float, *, least: float = 0.5, most: float = 1e5) -> float:
     """Return nu, the degrees of freedom that the quantile of the 6 parameters states: 6 F(6, nu) is at most that with 95 %."""
     from scipy.special import fdtridfd
 
-    return max(least, min(most, float(fdtridfd(6.0, 0.95, quantile_95 / 6.0))))  # of NaN, the most
+    # a probability; of NaN, the most
+    return max(least, min(most, float(fdtridfd(6.0, 0.95, quantile_95 / 6.0))))
 
 
 def _radius(covariance: np.ndarray, freedom: float) -> float:
@@ -112,8 +114,9 @@ def _rounded_up(value: float) -> float:
     """Round up to two digits, so that a figure never states less than the covariance."""
     if value <= 0.0 or not np.isfinite(value):
         return max(value, 0.0)
+    # a unit of the second digit
     step = 10.0 ** (np.floor(np.log10(value)) - 1.0)
-    return float(f"{np.ceil(value / step - 1e-9) * step:.3g}")
+    return float(f"{np.ceil(value / step - 1e-9) * step:.3g}")  # steps: rounding errors of float64 must not add one
 
 
 VerdictLevel: TypeAlias = Literal["good", "usable", "coarse", "contradictory", "nothing"]
@@ -133,7 +136,7 @@ _CONTRADICTIONS = ("mirrored-axes", "no-pose", "no-consensus", "refinement-diver
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
 _FEW, _EXCLUDED = "few-pairs", "excluded-by-residual"
-_LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
+_LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12  # [m^2, rad^2]: of a nanometer and of 1,000 km, beyond any pose's
 _BY_DEFAULT = SetOption("method", "default")
 _MOST_CHECKED = 3
 """Of the clicks with the largest residuals so many are named."""
@@ -262,7 +265,7 @@ def _alone_cm(calibration: Calibration) -> float:
     if not values[0] > 0.0:
         return float("nan")
     alone = (axes / values) @ axes.T
-    return _rounded_up(100.0 * _radius(alone, degrees_of_freedom(calibration.covariance_quantile)))
+    return _rounded_up(CM_PER_M * _radius(alone, degrees_of_freedom(calibration.covariance_quantile)))
 
 
 def _states_error(calibration: Calibration) -> bool:
@@ -320,6 +323,7 @@ def _most_helpful(calibration: Calibration, left: int | None) -> Action:
     scatter, metrics = _scatter_share(calibration), calibration.metrics
     if scatter > share and metrics.chi2 > metrics.degrees_of_freedom:
         return ReviewPairs(_largest_residuals(calibration))
+    # share of the variance left at least, as all of it may be that error's: no root of less than 0
     gains_more = best is not None and best.gain * np.sqrt(max(1.0 - share, 1e-9)) < 1.0
     if dominant and (best is None or best.may_stop or gains_more):
         return ReduceError(dominant[0].largest.name, calibration.options.solving.camera_position is not None)
