@@ -1,5 +1,6 @@
 """A watch says when something turned, keeps little, and carries a calibration forward by what it saw."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -82,11 +83,15 @@ def test_traffic_sees_a_turn_and_since_when():
     assert last.change.passages >= 3
 
 
-def test_words_and_json_always_state_the_power():
+def test_words_and_json_always_state_the_power(project_root):
     verdict = watch_of().add(stretch(10))
 
     assert "would have been noticed" in "\n".join(verdict_lines(verdict))
-    assert '"would_have_been_noticed_deg": {"pitch": 0' in json_line(verdict, at=TimeNs(5))
+    written = json.loads(json_line(verdict, at=TimeNs(5), exit_code=0))
+    assert written["would_have_been_noticed_deg"]["pitch"] >= 0.0
+    page = (project_root / "docs" / "watch.md").read_text(encoding="utf-8")
+    seen = next(value for value in (written["image"], written["returns"]) if value is not None)
+    assert [key for key in (*written, *seen) if f"`{key}`" not in page and key != "turned"] == []
     short = baseline_of(
         [stretch(0, against_deg=(0.0, 0.0, 0.0))], calibration_sha256="a" * 64, recording="r", camera=SMALL
     )
