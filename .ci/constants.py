@@ -1,9 +1,10 @@
 """List the constants of the mathematics: `python .ci/constants.py [--missing] [--double NAME]`.
 
-A constant is a number in estimation, association, diagnostics or results, in a table, a default or a function alike; not 0, 1, 2
-and a half, nor an index, an axis or the size of an array, nor 3 and 6 in a function (dimensions of space and pose). Its unit is
-the suffix of its name or a word of the comment or docstring beside it, its source is what else stands there. `--double` runs the
-coverage guard with one of them doubled.
+A constant is a number in estimation, association, diagnostics or results, in a table, a default or a function alike; not 0, 1,
+2 and a half, nor an index, an axis or the size of an array, nor 3 and 6 in a function (dimensions of space and pose), nor the
+whole numbers of a function whose docstring names the formula that has them as coefficients. Its unit is the suffix of its name
+or a word of the comment or docstring beside it, its source is what else stands there. `--double` runs the coverage guard with
+one of them doubled.
 """
 
 import argparse
@@ -23,6 +24,7 @@ from pathlib import Path
 ROOMS = ("estimation", "association", "diagnostics", "results")
 TRIVIAL, DIMENSIONS = {0, 1, 2, 0.5}, {3, 6}
 SIZED = {"arange", "diag", "empty", "eye", "full", "ones", "range", "reshape", "round", "split", "tile", "zeros"}
+FORMULA = "coefficients of a formula"
 NOT_MEASURES = {"axis", "axes", "shape", "ndmin", "ddof"}
 UNIT = re.compile(
     r"_(m|m2|px|px2|rad|rad2|deg|s|ns|db|dbsm|mps|hz|cm|percent|share|sigmas?|ratio|odds|count|pairs|trials|steps)\b|%|\["
@@ -64,7 +66,8 @@ def numbers_of(node: ast.AST, owner: str, beside: str) -> Iterator[tuple[str, as
     for child in ast.iter_child_nodes(node):
         inner, said = owner, beside
         if isinstance(child, ast.FunctionDef | ast.ClassDef):
-            inner, said = f"{owner}.{child.name}".strip("."), ""
+            inner = f"{owner}.{child.name}".strip(".")
+            said = FORMULA if "coefficients" in (ast.get_docstring(child) or "") else ""
         elif isinstance(child, ast.Assign | ast.AnnAssign) and isinstance(node, ast.Module | ast.ClassDef):
             target = child.target if isinstance(child, ast.AnnAssign) else child.targets[0]
             after = body[body.index(child) + 1 :][:1] if isinstance(body, list) else []
@@ -72,10 +75,12 @@ def numbers_of(node: ast.AST, owner: str, beside: str) -> Iterator[tuple[str, as
             said = next((ast.unparse(one.value) for one in after if isinstance(one, ast.Expr)), "")
         if isinstance(child, ast.Constant):
             in_function = not isinstance(node, ast.Module | ast.ClassDef) and owner.rpartition(".")[2].islower()
-            if type(child.value) in (int, float) and abs(child.value) not in TRIVIAL | (
-                DIMENSIONS if in_function else set()
+            if (
+                type(child.value) in (int, float)
+                and abs(child.value) not in TRIVIAL | (DIMENSIONS if in_function else set())
+                and not (beside == FORMULA and child.value % 1 == 0)
             ):
-                yield owner, child, beside
+                yield owner, child, beside.replace(FORMULA, "")
         elif not structural(child):
             yield from numbers_of(child.value if isinstance(child, ast.Subscript) else child, inner, said)
 

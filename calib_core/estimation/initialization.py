@@ -14,13 +14,14 @@ from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar
 
-_TWO_POINT_DRAWS = 800
-_THREE_POINT_DRAWS = 300
-_MOST_SCORED_ROWS = 400
-_SCORED_AT_ONCE = 8000  # residuals whose many intermediate arrays fit into the processor's cache
-_FAR = 1e12  # squared residual of an impossible position
-_ROBUST_RADIUS = 5.0  # whitened residuals beyond it count as about one outlier each
-_DIFFERENT = 0.15  # rad, or per metre of camera centre: closer starts end in the same pose
+_TWO_POINT_DRAWS, _THREE_POINT_DRAWS, _MOST_SCORED_ROWS, _LEAST_SCORED_PAIRS = 800, 300, 400, 20
+"""Number of draws and of what each is scored against. A choice: the product is the time; more draws find a pose among more
+wrong pairs, more rows order the draws better."""
+_SCORED_AT_ONCE = 8000  # number of residuals whose many intermediate arrays fit into the processor's cache
+_FAR = 1e12  # squared standard deviations of an impossible position: finite, so that costs can be added
+_ROBUST_RADIUS = 5.0  # standard deviations; larger residuals count as about one outlier each
+_DIFFERENT_RAD = 0.15  # closer starts end in the same pose
+_LEAST_LENGTH_M = 1e-9  # the direction of a shorter vector is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +109,7 @@ def _frames(two: np.ndarray) -> np.ndarray:
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 1e-9, length, np.nan))
+    return np.asarray(vectors / np.where(length > _LEAST_LENGTH_M, length, np.nan))
 
 
 def three_point_poses(points_radar_m: Points3, rays: Points3, draws: _Draws) -> Hypotheses:
@@ -128,7 +129,10 @@ def three_point_poses(points_radar_m: Points3, rays: Points3, draws: _Draws) -> 
 
 
 def _grunert_distances(points: np.ndarray, rays: np.ndarray) -> tuple[Points3, Indices]:
-    """Return the distances (k, 3) of the three points along their rays, and the draw each solution belongs to (k,)."""
+    """Return the distances (k, 3) of the three points along their rays, and the draw each solution belongs to (k,).
+
+    The coefficients are those of Grunert's quartic in v (Haralick et al., 1994).
+    """
     a2, b2, c2 = (((points[:, i] - points[:, j]) ** 2).sum(axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
     cos_a, cos_b, cos_c = ((rays[:, i] * rays[:, j]).sum(axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
     with np.errstate(all="ignore"):
@@ -157,8 +161,10 @@ def _real_roots(quartic: np.ndarray) -> np.ndarray:
     """Return the real parts (h, 4) of the nearly real roots of each quartic, NaN for the rest (Ferrari's method).
 
     With x = y - a / 4, y^4 + p y^2 + q y + r = (y^2 + p / 2 + m)^2 - 2 m (y - q / (4 m))^2 for a root m of
-    8 m^3 + 8 p m^2 + (2 p^2 - 8 r) m - q^2 = 0; the largest of the three loses the fewest digits.
+    8 m^3 + 8 p m^2 + (2 p^2 - 8 r) m - q^2 = 0; the largest of the three loses the fewest digits. The coefficients p, q and r
+    are those of the depressed quartic.
     """
+    # coefficients are ratios of squared distances: a smaller one is rounding, and the equation a cubic
     leading = np.where(np.abs(quartic[:, 0]) > 1e-12, quartic[:, 0], np.nan)
     a, b, c, d = (quartic[:, 1:].T / leading).astype(np.complex128)
     p = b - 3.0 / 8.0 * a**2
@@ -169,11 +175,15 @@ def _real_roots(quartic: np.ndarray) -> np.ndarray:
     ratio = q / np.where(side == 0, 1.0, side)
     plus, minus = np.sqrt(-2.0 * (p + m + ratio)), np.sqrt(-2.0 * (p + m - ratio))
     roots = np.stack([side + plus, side - plus, minus - side, -minus - side], axis=1) / 2.0 - a[:, None] / 4.0
+    # ratio to the real part, a choice: noise turns a double root into two complex ones
     return np.where(np.abs(roots.imag) < 0.02 * np.abs(roots.real) + 1e-9, roots.real, np.nan)
 
 
 def _largest_cubic_root(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return the root of m^3 + a m^2 + b m + c that is largest in magnitude, for each row (Cardano's formula)."""
+    """Return the root of m^3 + a m^2 + b m + c that is largest in magnitude, for each row.
+
+    The coefficients are those of Cardano's formula.
+    """
     p, q = b - a**2 / 3.0, 2.0 / 27.0 * a**3 - a * b / 3.0 + c
     radical = np.sqrt(q**2 / 4.0 + p**3 / 27.0)
     radical = np.where((np.conj(q) * radical).real > 0.0, -radical, radical)  # the sign without cancellation
@@ -186,7 +196,7 @@ def _largest_cubic_root(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarr
 def _thinned(measurements: PairMeasurements, usable: Indices) -> PairMeasurements:
     """Keep evenly spread pairs, so that scoring costs the same for 1,000 pairs as for 200."""
     per_pair = len(measurements.polar) / len(measurements)
-    most = max(int(_MOST_SCORED_ROWS / per_pair), 20)
+    most = max(int(_MOST_SCORED_ROWS / per_pair), _LEAST_SCORED_PAIRS)
     if len(usable) > most:
         usable = usable[np.linspace(0, len(usable) - 1, most).round().astype(np.int64)]
     return measurements if len(usable) == len(measurements) else measurements.some(usable)
@@ -235,7 +245,7 @@ class _Scored:
     def squared(self, rotations: np.ndarray, centres_m: Points3) -> np.ndarray:
         """Return the squared whitened angular residuals (h, m), large where a point lies behind its ray."""
         x, y, z = self.points_m[:, None, :] - centres_m.T[:, :, None]
-        flat2 = np.maximum(x * x + y * y, 1e-18)
+        flat2 = np.maximum(x * x + y * y, _LEAST_LENGTH_M**2)
         length2 = flat2 + z * z
         turned_x, turned_y, turned_z = np.moveaxis(rotations, 2, 0) @ self.rays  # R^T ray
         along = x * turned_x + y * turned_y + z * turned_z
@@ -256,7 +266,7 @@ def _best_that_differ(hypotheses: Hypotheses, costs: Values, most: int) -> tuple
     while len(chosen) < most and np.isfinite(left).any():
         best = int(np.argmin(left))
         chosen.append(best)
-        left[_distances(hypotheses, best) <= _DIFFERENT] = np.inf
+        left[_distances(hypotheses, best) <= _DIFFERENT_RAD] = np.inf
         left[best] = np.inf
     return tuple(hypotheses.pose(index) for index in chosen)
 
@@ -265,4 +275,5 @@ def _distances(hypotheses: Hypotheses, index: int) -> Values:
     """Return rotation angle [rad] plus a fifth of the distance between the centres [m], from one hypothesis to all (h,)."""
     traces = np.einsum("hij,ij->h", hypotheses.rotations, hypotheses.rotations[index])
     apart_m = np.linalg.norm(hypotheses.centres_m - hypotheses.centres_m[index], axis=1)
+    # [rad/m] a camera that moves across by 1 m sees a placement 5 m away turn by 0.2 rad
     return np.asarray(np.arccos(np.clip((traces - 1.0) / 2.0, -1.0, 1.0)) + 0.2 * apart_m)
