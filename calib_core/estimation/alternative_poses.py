@@ -50,11 +50,13 @@ class PossiblePose:
 
 
 _LEAST_PAIRS = 4  # three always agree
+# a ratio that outliers without a common pose reach in at most one set of 100, whatever their distribution (Markov)
 _LEAST_LOG_RATIO = float(np.log(100.0))
-_STARTS = 12
-_ROUNDS = 15
+_STARTS, _ROUNDS = 12, 15
+"""Number of starts, and of steps from each. A choice: a group of few is found more surely with more, which take longer."""
 _SHARE = 0.5  # of the outliers that may belong to the group
-_MOST_OUTLIERS = 150
+_MOST_PAIRS = 150
+"""A search among more takes seconds; the posterior of larger sets has one peak."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +89,7 @@ def find_agreeing_outliers(
         rng: random generator of the hypotheses.
     """
     outliers = np.flatnonzero(~refined.inliers)
-    if not _LEAST_PAIRS <= len(outliers) <= _MOST_OUTLIERS:
+    if not _LEAST_PAIRS <= len(outliers) <= _MOST_PAIRS:
         return None
     # a companion's camera may be anywhere
     free = replace(measurements, prior=measurements.prior.weakened()).some(outliers)
@@ -121,18 +123,17 @@ def _starts(
 
 def _log_ratios(modes: Modes, sigma_m: float) -> Values:
     """Return equation (7) of each mode; the camera prior's density is 1 / (pi^2 sigma^3) at its centre."""
+    # all rotations have the volume 8 pi^2 [rad^3]
     prior = -np.log(8.0 * np.pi**2) - np.log(np.pi**2 * sigma_m**3)
     return np.asarray(modes.evidence + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(modes.hessians)[1])
 
 
-_MOST_PAIRS = 150  # in larger sets the posterior has one peak, and a search takes seconds
-_CLEARLY_ENOUGH, _CLEARLY_AGREEING = (
-    12,
-    0.75,
-)  # inliers, and their share, beyond which other peaks never changed an answer
+_CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75
+"""Inliers, and their share of the pairs, beyond which other peaks never changed an answer."""
 
 NARROW_CONDITION = 5e5
-"""The scaled condition number above which the placements lie in too narrow a strip."""
+"""Above it the placements lie in too narrow a strip: ratio of the largest to the smallest eigenvalue of the pairs' information
+about the pose, scaled to a unit diagonal. A choice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

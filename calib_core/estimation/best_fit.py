@@ -22,7 +22,7 @@ MIRRORED_GAIN = 10.6
 in less than one set of 200."""
 
 NOT_MIRRORED_GAIN = -3.0
-"""Gain up to which the axes are taken as right; between the two limits, the question stays open."""
+"""Gain up to which the axes are taken as right, odds of 4.5 to 1: a choice. Between the two limits, the question stays open."""
 
 _STARTS = 2
 _DECISIVE_DIFFERENCE = 30.0  # of costs, too large for other noise levels to reverse
@@ -73,14 +73,15 @@ def _cost(fit: ErrorsInVariablesFit) -> float:
     return mixture_cost(fit.measurements, fit.camera_from_radar)
 
 
-_STARTS_MEASURED = 3
-_STARTS_FREE = 6
-_STARTS_QUICK = 3
-_STILL_AGREEING_SHARE = 0.6
+_STARTS_MEASURED, _STARTS_FREE, _STARTS_QUICK = 3, 6, 3
+"""Number of starts with a measured camera position, without one, and of a preview. A choice: more miss fewer poses and take
+longer."""
+_STILL_AGREEING_SHARE = 0.6  # a choice: below it a preview starts anew
+# with 0.9, sets with one wrong pair in five had the mirrored fit too, which named no more mirrored radars
 _AGREEING_SHARE = 0.75
-_PLAUSIBLE_SCALE = 1.8
+_PLAUSIBLE_SCALE = 1.8  # times the assumed noise, a choice
 _NEAR_PRIOR = 4.0  # standard deviations
-_PAIRS_TO_START = 150  # more do not improve the initialization
+_PAIRS_TO_START = 150  # pairs; more do not improve the initialization
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,8 +21,9 @@ import numpy as np
 
 from calib_core.arrays import Indices, Matrix66, Points2, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.gnc import RIDGE, TINY, normal_equations
 from calib_core.estimation.measurement_model import prior_rows
+from calib_core.estimation.pose_posterior import LARGEST_EXPONENT
 from calib_core.options import RadarOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results.calibration import CHI2_95_6, CovarianceParts
@@ -285,7 +286,7 @@ def _shares(results: Sequence[SystematicErrorResult], pose: Matrix66) -> tuple[S
 
 def _floored(plain: np.ndarray, lost: np.ndarray) -> np.ndarray:
     """Subtract the lost information, but keep at least a share of the plain information in every direction."""
-    root = np.linalg.cholesky(plain + 1e-12 * np.diag(np.diag(plain)))
+    root = np.linalg.cholesky(plain + RIDGE * np.diag(np.diag(plain)))
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(np.eye(len(plain)) - inverse @ lost @ inverse.T)
     kept = (vectors * np.maximum(values, _LEAST_SHARE)) @ vectors.T
@@ -303,15 +304,16 @@ def _widened(covariance: np.ndarray, plain: np.ndarray, spread: np.ndarray) -> n
 
 def symmetric_inverse(matrix: np.ndarray) -> np.ndarray:
     """Return the inverse of a positive definite matrix whose unknowns have different units, symmetric to the last bit."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), TINY))
     inverse = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
     return np.asarray((inverse + inverse.T) / 2.0)
 
 
 def _scaled_condition(information: np.ndarray) -> float:
     pose = information[:6, :6]
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(pose), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(pose), TINY))
     values = np.linalg.eigvalsh(pose * np.outer(scale, scale))
+    # of a matrix with a unit diagonal: an eigenvalue below the rounding of float64
     return float(values[-1] / max(values[0], 1e-16))
 
 
@@ -328,18 +330,19 @@ def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
         return CHI2_95_6
     from scipy.special import fdtri
 
+    # the share inside, as of CHI2_95_6
     return float(CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - CHI2_95_6))
 
 
+# degrees, a quarter of a decade apart: a choice; a shorter one is nearly independent noise, a longer one nearly a turn
 _LENGTHS_RAD = (np.deg2rad(10.0), np.deg2rad(18.0), np.deg2rad(32.0))
 _SMOOTH_SHARE = 0.8  # of an angle's variance: a radar's stated accuracy is mostly that of its array's calibration
 _INDEPENDENT = (1.0, 0.6, 0.35, 0.15)  # variance of the rest beside it, over the estimated one
 _SMOOTH_PROBABILITY = 0.8  # before any residual, spread evenly over lengths and variances of the rest
 _SHOWN = 0.95  # probability of smooth errors from which the residuals show them
-_MOST_CENTERS = 40
-_LEAST_PAIRS = 7.0
-_MOST_LOG_RATIO = 500.0  # exp() of more is beyond all numbers
-_NEGLIGIBLE = 1e-10
+_MOST_CENTERS = 40  # number of directions, a choice: the time of the decomposition is its cube
+_LEAST_PAIRS = 7.0  # a choice: 14 residuals, of which the pose leaves 8
+_NEGLIGIBLE = 1e-10  # share of the largest eigenvalue, above its rounding in float64: smaller ones are noise
 
 
 def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tuple[np.ndarray, bool] | None:
@@ -367,7 +370,7 @@ def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tup
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
         middles += [part * own + share * (shared.T @ shared) for part, share in levels]
     independent = _log_likelihoods(residual, jacobian, prior, np.zeros((len(residual), 0)), [(1.0, 0.0)])
-    ratios = np.exp(np.minimum(np.concatenate(likelihoods) - independent, _MOST_LOG_RATIO))
+    ratios = np.exp(np.minimum(np.concatenate(likelihoods) - independent, LARGEST_EXPONENT))
     weights = np.concatenate([[1.0 - _SMOOTH_PROBABILITY], _SMOOTH_PROBABILITY * ratios / len(ratios)])
     middle = np.tensordot(weights / weights.sum(), np.array(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
@@ -391,6 +394,7 @@ def smooth_rows(refined: ErrorsInVariablesFit, inliers: Indices, length_rad: flo
     chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTERS)).round().astype(np.int64)
     centers = directions[chosen]
     values, vectors = np.linalg.eigh(_kernel(centers, centers, length_rad))
+    # share of the largest eigenvalue, a choice: such a part has a thousandth of the largest standard deviation
     kept = values > 1e-6 * values[-1]
     features = _kernel(directions, centers, length_rad) @ (vectors[:, kept] / np.sqrt(values[kept]))
     absorbed = np.clip(refined.noise_scale[1:], (1.0 - _SMOOTH_SHARE) ** 0.5, 1.0)

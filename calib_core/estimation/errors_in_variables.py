@@ -17,7 +17,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Matrix66, Values
-from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations, rival_rows
+from calib_core.estimation.gnc import (
+    INLIER_SHARE,
+    LEAST_INFORMATION,
+    RIDGE,
+    TINY,
+    GncSolution,
+    associate,
+    log_odds_of,
+    normal_equations,
+    rival_rows,
+)
 from calib_core.estimation.leave_one_out import (
     COMPONENTS,
     PSEUDO_SHARED,
@@ -29,23 +39,27 @@ from calib_core.estimation.leave_one_out import (
     shrunk_scales,
 )
 from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
+from calib_core.estimation.pose_posterior import (
+    LARGEST_EXPONENT,
+    NEAR_OUTLIER_FACTOR,
+    NEAR_OUTLIER_SHARE,
+    NEAR_SIGMAS,
+    PRIOR_INLIERS,
+    PRIOR_OUTLIERS,
+)
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import MIN_PAIRS
 
-_MOST_ROUNDS = 80
-_ROUNDS_BEFORE_SCALES = 3
-_ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
+_MOST_ROUNDS = 80  # number of steps, a choice: a fit that has not settled by then ends there
+_ROUNDS_BEFORE_SCALES = 3  # steps, a choice: residuals at a pose that still moves would pass for noise
+_ROUNDS_PER_WEIGHING = 3  # steps from one weighing to the next, a choice: weights settle long before noise scales do
 _TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
-_COARSE_TOLERANCES = (0.02, 0.02)
+_COARSE_TOLERANCES = (0.02, 0.02)  # of the same units, a choice: previews and the gain of mirrored axes need no more
 _LARGEST_RATIO = 0.95  # of successive changes of the noise scales; above it nothing is extrapolated
 _UNDONE, _SMALL_STEP, _MAX_DAMPING = 0.3, 1e-6, 1e4  # share of a step, squared standard deviations of the priors
-_PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
-_NEAR_OUTLIER_SHARE = 0.01  # of the pairs that are not outliers anywhere on the image
-_NEAR_OUTLIER_FACTOR = 5.0  # how many times noisier a near outlier is
-_LEAST_PAIRS_FOR_SCALES = 5.0
+_LEAST_PAIRS_FOR_SCALES = 5.0  # pairs, a choice: 10 residuals, of which the pose leaves 4
 _HALF = 0.5
 _MOST_ASKED, _LEAST_DECIDED = 0.2, MIN_PAIRS + 2  # share of the pairs; inliers besides them
-_NEAR = 6.0  # standard deviations beyond which a pair does not update its own true position
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +134,7 @@ class _State:
         """
         if len(self.step):
             length = float(self.step @ prior_information @ self.step)
-            undone = -float(step @ prior_information @ self.step) / max(length, 1e-300)
+            undone = -float(step @ prior_information @ self.step) / max(length, TINY)
             if undone < -_UNDONE or (undone > _UNDONE and length > _SMALL_STEP):
                 self.damping = min(max(self.damping * (1.0 + undone), 1.0), _MAX_DAMPING)
         self.step = step
@@ -132,7 +146,7 @@ class _State:
         later rounds would, q / (1 - q) times the change; it saves rounds and does not move the fixed point.
         """
         change = np.log(scale / self.scale)
-        ratio = float(change @ self.change) / max(float(self.change @ self.change), 1e-300)
+        ratio = float(change @ self.change) / max(float(self.change @ self.change), TINY)
         if extrapolate and 0.0 < ratio < _LARGEST_RATIO:
             scale = scale * np.exp(change * (ratio / (1.0 - ratio)))
         self.scale, self.change = scale, change
@@ -157,10 +171,11 @@ def fit_errors_in_variables(
         noise_scale: (4,) to start from; None takes the start's.
     """
     tolerances = _COARSE_TOLERANCES if coarse else _TOLERANCES
-    scale = np.array(noise_scale or [start.noise_scale] * 4)
+    scale = np.array(noise_scale or np.full(4, start.noise_scale))
     noisy = measurements.without_errors().scaled(scale)
     rows = associate(noisy, start.camera_from_radar)[0]
-    state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8, measurements.errors.values)
+    pose, errors = start.camera_from_radar, measurements.errors.values
+    state = _State(pose, None, rows, noisy.measured(rows), scale, INLIER_SHARE, errors)
     state.weights = _first_weights(noisy, state)
     degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
@@ -200,7 +215,7 @@ def _first_weights(measurements: PairMeasurements, state: _State) -> Values:
 
 
 def _probability(odds: Values) -> Values:
-    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-odds, 500.0))))
+    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-odds, LARGEST_EXPONENT))))
 
 
 def _expect(
@@ -220,7 +235,7 @@ def _expect(
     predicted = predict_left_out(measurements, state.pose, model, state.weights, parts, state.scale if scaled else None)
     state.weights = _probability(_log_odds(measurements, state, model, predicted))
     inliers, count = state.weights.sum(), len(state.weights)
-    state.share = float((inliers + _PRIOR_INLIERS) / (count + _PRIOR_INLIERS + _PRIOR_OUTLIERS))
+    state.share = float((inliers + PRIOR_INLIERS) / (count + PRIOR_INLIERS + PRIOR_OUTLIERS))
     return model, parts
 
 
@@ -230,7 +245,7 @@ def _log_odds(
     """Return log odds (n,) of an inlier against a near outlier or an outlier anywhere on the image."""
     prior = np.log(state.share) - np.log1p(-state.share) + measurements.log_score[state.rows]
     anywhere = -prior + 0.5 * model.log_determinant + measurements.log_outlier
-    near = np.log(_NEAR_OUTLIER_SHARE) - np.log1p(-_NEAR_OUTLIER_SHARE) + predicted.log_density(_NEAR_OUTLIER_FACTOR)
+    near = np.log(NEAR_OUTLIER_SHARE) - np.log1p(-NEAR_OUTLIER_SHARE) + predicted.log_density(NEAR_OUTLIER_FACTOR)
     return np.asarray(predicted.log_density() - np.logaddexp(anywhere, near))
 
 
@@ -242,13 +257,14 @@ def _model(measurements: PairMeasurements, state: _State) -> Linearization:
 def _maximise(measurements: PairMeasurements, state: _State, model: Linearization) -> tuple[float, Matrix66]:
     """Update pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
     hessian, gradient = normal_equations(measurements, state.pose, model, state.weights)
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
+    scale = np.sqrt(np.maximum(np.diag(hessian), LEAST_INFORMATION))
     damped = hessian.copy()
     damping = (
         state.damping if state.polar is not None else _MAX_DAMPING
     )  # noise would pass for a scale at measured positions
     damped[6:, 6:] += (damping - 1.0) * measurements.errors.prior_information
-    step = np.linalg.solve(damped / np.outer(scale, scale) + 1e-12 * np.eye(len(scale)), gradient / scale) / scale
+    step = np.linalg.solve(damped / np.outer(scale, scale) + RIDGE * np.eye(len(scale)), gradient / scale) / scale
+    # steps of at most 0.2 rad and 1 m, a choice: fits start near the optimum
     longest = max(float(np.linalg.norm(step[3:6])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
     step = step / longest
     state.adapt_damping(step[6:], measurements.errors.prior_information)
@@ -257,7 +273,7 @@ def _maximise(measurements: PairMeasurements, state: _State, model: Linearizatio
     # mu = m' + V J^T S^-1 (e - J step), from the eliminated equations
     left = model.planes[0] - (step @ model.unknown_planes.reshape(len(step), -1)).reshape(2, -1)
     pull = (model.polar_planes * left).sum(axis=1)
-    near = left[0] ** 2 + left[1] ** 2 < _NEAR**2
+    near = left[0] ** 2 + left[1] ** 2 < NEAR_SIGMAS**2
     polar = measurements.with_errors(state.errors).measured(state.rows).polar
     state.polar = np.where(near, polar + state.measured.sigma_polar**2 * pull, polar)
     return float(np.sqrt(max(step @ hessian @ step, 0.0))), hessian

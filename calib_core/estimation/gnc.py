@@ -20,11 +20,18 @@ from calib_core.radar import cartesian_from_polar, direction_cosines
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
 """Radii of the Geman-McClure loss in standard deviations, in order of use."""
 
+INLIER_SHARE = 0.8
+"""Of the pairs, before any is looked at. A choice: one wrong pair in five."""
+
+LEAST_INFORMATION, RIDGE, TINY = 1e-12, 1e-12, 1e-300
+"""Guards against zero, far below what a pair contributes: the least information about an unknown [1/m^2 or 1/rad^2], the share
+of its diagonal that keeps a singular matrix invertible (float64 rounds to 1e-16), a divisor whose inverse is finite."""
+
 _STEPS_PER_RADIUS = 2
-_INLIER_SHARE = 0.8
 _SAME_POSE = 0.25  # squared distance, in standard deviations
+# times the assumed noise, in factors of sqrt(2); the end is a choice
 _NOISE_SCALES = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
-_BEYOND = 1e-6  # weight of what a cost exceeds that of an outlier by: it only orders outliers
+_BEYOND = 1e-6  # share that counts of what a cost exceeds that of an outlier by: it only orders outliers
 _SCALE_PENALTY = 4.0  # how much better a larger noise level must explain the pairs than the assumed one
 
 
@@ -97,7 +104,8 @@ def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
             _, model = _associated(measurements, measured, poses)
             weights = (1.0 + model.squared / radius**2) ** -2.0
             hessians, gradients = _normal_equations(measurements, poses, model, weights)
-            poses = poses.perturbed(_damped(hessians, gradients))
+            # a choice: larger steps leave what one linearization describes
+            poses = poses.perturbed(damped_steps(hessians, gradients, largest_turn_rad=0.5, largest_shift_m=2.0))
     return poses.some(_distinct(poses, hessians))
 
 
@@ -142,7 +150,7 @@ def _associated(
     rows = np.minimum.reduceat(np.where(cheapest, np.arange(count), count), first, axis=-1)  # of equals, the first
     twice = taken_twice(measurements.returns[rows])
     if twice.any():
-        fits = 2.0 * _log_odds(measurements, np.zeros(1), np.zeros(1), _INLIER_SHARE)[measurements.owner]
+        fits = 2.0 * _log_odds(measurements, np.zeros(1), np.zeros(1), INLIER_SHARE)[measurements.owner]
         cost = np.minimum(
             cost, fits + _BEYOND * (cost - fits)
         )  # an outlier does not take the return of a pair that fits
@@ -154,7 +162,7 @@ _AS_WELL = 4.0
 """How much larger -2 log-likelihood may be for another choice of returns to explain the clicks as well: odds of 1 to 7."""
 
 _ELSEWHERE = 3.0  # steps between two returns that are not parts of one
-_RULED_OUT = 1e9
+_RULED_OUT = 1e9  # in units of -2 log-likelihood: more than any return costs, and finite, so that sums of it are
 
 
 def rival_rows(measurements: PairMeasurements, pose: RigidTransform, asked: Flags) -> Indices:
@@ -217,13 +225,16 @@ def _normal_equations(
     return hessian, gradient
 
 
-def _damped(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-    """Solve for steps (s, 6) of at most 0.5 rad and 2 m, slightly damped for directions that the pairs do not determine."""
-    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), 1e-12))
+def damped_steps(
+    hessians: np.ndarray, gradients: np.ndarray, *, largest_turn_rad: float, largest_shift_m: float
+) -> np.ndarray:
+    """Solve for steps (s, 6) of limited length, slightly damped for directions that the pairs do not determine."""
+    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), LEAST_INFORMATION))
+    # share of the diagonal, a choice: it does not move the optimum, and singular matrices can be solved
     scaled = hessians / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(6)
     steps = np.linalg.solve(scaled, (gradients / scale)[:, :, None])[:, :, 0] / scale
     turns, shifts = np.linalg.norm(steps[:, 3:], axis=1), np.linalg.norm(steps[:, :3], axis=1)
-    return np.asarray(steps / np.maximum(np.maximum(turns / 0.5, shifts / 2.0), 1.0)[:, None])
+    return np.asarray(steps / np.maximum(np.maximum(turns / largest_turn_rad, shifts / largest_shift_m), 1.0)[:, None])
 
 
 def log_odds_of(measurements: PairMeasurements, model: Linearization, log_score: Values, inlier_share: float) -> Values:
@@ -248,7 +259,8 @@ def _mixture_costs(measurements: PairMeasurements, poses: _Poses, scales: Sequen
     """Return the costs (s, k) with all noise multiplied by each scale: S grows by its square, log det S by 4 log scale."""
     rows, model = _associated(measurements, _of_candidates(measurements), poses)
     factors = np.array(scales)[:, None]
+    # S is 2 x 2: its determinant grows by the fourth power of the factor
     deviance = model.squared[:, None, :] / factors**2 + model.log_determinant[:, None, :] + 4.0 * np.log(factors)
-    odds = _log_odds(measurements, deviance, measurements.log_score[rows][..., None, :], _INLIER_SHARE)
+    odds = _log_odds(measurements, deviance, measurements.log_score[rows][..., None, :], INLIER_SHARE)
     costs = -2.0 * np.logaddexp(0.0, odds).sum(axis=-1) + _SCALE_PENALTY * (factors[:, 0] > 1.0)
     return np.asarray(costs + measurements.prior.costs(poses.rotations, poses.translations_m)[:, None])

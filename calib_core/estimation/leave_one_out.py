@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Indices, Matrix66, Points3, Values
-from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.gnc import RIDGE, normal_equations
 from calib_core.estimation.measurement_model import Linearization, PairMeasurements
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar
@@ -33,8 +33,8 @@ PSEUDO_SHARED = 4.0
 COMPONENTS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)
 """Which of (click, range, azimuth, elevation) each of the five columns of noise belongs to."""
 
-_SCALE_LIMITS = (0.1, 12.0)
-_MANY_DEGREES = 1e9  # effectively infinite
+_SCALE_LIMITS = (0.1, 12.0)  # times the assumed noise, a choice: pairs that agree exactly, or hardly, end there
+_MANY_DEGREES = 1e9  # of freedom, in place of infinitely many, which make the density NaN
 _OWN_SHARE = 0.999  # of its own information that is removed with a pair; removing all of it makes four pairs singular
 
 
@@ -166,7 +166,7 @@ def predict_left_out(
     """
     hessian, gradient = normal_equations(measurements, pose, model, weights)
     residual, jacobian = model.planes[0], model.unknown_planes
-    inverse = np.linalg.inv(hessian + 1e-12 * np.diag(np.diag(hessian)))
+    inverse = np.linalg.inv(hessian + RIDGE * np.diag(np.diag(hessian)))
     back = (inverse @ jacobian.reshape(len(hessian), -1)).reshape(jacobian.shape)  # B
     leverage = Symmetric.between(jacobian, back)  # G
     own = _OWN_SHARE * weights
@@ -315,7 +315,7 @@ def leave_one_out(
     own = weights[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
     pull = weights[:, None] * (np.swapaxes(jacobian, 1, 2) @ residual[:, :, None])[:, :, 0]
     scale = 1.0 / np.sqrt(np.diag(information))
-    rest = (information - 0.999 * own) * np.outer(scale, scale)
+    rest = (information - _OWN_SHARE * own) * np.outer(scale, scale)
     moves = -np.linalg.solve(rest, (pull * scale)[:, :, None])[:, :, 0] * scale
     turned = moves[:, :6] @ pose_information
     influence = np.sqrt(np.maximum((turned * moves[:, :6]).sum(axis=1), 0.0))
@@ -330,7 +330,7 @@ def _moved(pose: RigidTransform, moves: np.ndarray, points_radar_m: Points3) -> 
     """Return each point (n, 3) in the camera frame under the pose moved by its own (dt, dtheta), by Rodrigues' formula."""
     turned = points_radar_m @ pose.rotation.T
     angle = np.linalg.norm(moves[:, 3:], axis=1, keepdims=True)
-    axis = moves[:, 3:] / np.maximum(angle, 1e-12)
+    axis = moves[:, 3:] / np.maximum(angle, 1e-12)  # [rad] a smaller turn moves no point; float64 rounds to 1e-16
     along = axis * (axis * turned).sum(axis=1, keepdims=True)
     rotated = along + (turned - along) * np.cos(angle) + np.cross(axis, turned) * np.sin(angle)
     return np.asarray(rotated + pose.translation_m + moves[:, :3])

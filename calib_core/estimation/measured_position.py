@@ -24,24 +24,23 @@ from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
+from calib_core.estimation.plausibility import UNITS_M
+from calib_core.estimation.pose_posterior import LARGEST_EXPONENT
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.measurements import MIN_PAIRS
 from calib_core.radar import cartesian_from_polar
 
 _SLIP_PROBABILITY = 0.02  # p: of positions measured to another point of the housing, with a wrong sign, in another unit
-_SLIP_SIGMA_M, _SLIP_SIGMAS = (
-    0.3,
-    3.0,
-)  # per axis: the size of housings and mounts; and more than the tape is off anyway
-_LEAST_PROBABILITY = 0.01  # q of a position without weight
-_OTHER_UNIT_SIGMAS = 4.0
-_AGREEING_SIGMAS = 3.0
+_SLIP_SIGMA_M, _SLIP_SIGMAS = 0.3, 3.0
+"""Per axis: the size of housings and mounts; and more than the tape is off anyway."""
+_LEAST_PROBABILITY = 0.01  # probability q below which a position has no weight; its variance V1 / q is 100 V1 there
+_OTHER_UNIT_SIGMAS, _AGREEING_SIGMAS = 4.0, 3.0
+"""By which a camera is not at the radar, and within which it is at another reading: exceeded by chance in 0.1 % and 3 %
+(chi-square with three degrees of freedom)."""
 
 _UNIT_SLIPS = (
-    ("position", "centimeters", 0.01),
-    ("position", "millimeters", 0.001),
-    ("position", "feet", 0.3048),
-    ("ranges", "feet", 1.0 / 0.3048),
+    *(("position", unit, factor) for unit, factor in UNITS_M.items()),
+    ("ranges", "feet", 1.0 / UNITS_M["feet"]),
 )
 """What may have another unit, which one, and the factor on the measured position that this makes."""
 
@@ -91,7 +90,7 @@ def weighed_position(
     slip_m2 = variance_m2 + max(_SLIP_SIGMA_M, _SLIP_SIGMAS * prior.sigma_m) ** 2
     right, slip = (_log_density(centre, away_m, v, freedom) for v in (variance_m2, slip_m2))
     odds = np.log(1.0 / _SLIP_PROBABILITY - 1.0) + right - slip
-    probability = float(1.0 / (1.0 + np.exp(min(-odds, 500.0))))
+    probability = float(1.0 / (1.0 + np.exp(min(-odds, LARGEST_EXPONENT))))
     sigmas = centre.sigmas_from(prior.position_m, variance_m2**0.5)
     chance = _chance(sigmas, freedom)
     variance_m2 = prior.expected_variance_m2(variance_m2 * centre.solved(away_m, variance_m2))
@@ -181,5 +180,6 @@ def _level(fit: ErrorsInVariablesFit) -> Matrix33:
     up = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
     up = up * (1.0 if up[2] >= 0.0 else -1.0)
     left = np.cross(up, (1.0, 0.0, 0.0))
+    # length of a unit vector's part, a choice: only placements across the radar's x axis have a shorter one
     left = left / max(float(np.linalg.norm(left)), 1e-9)
     return np.column_stack([np.cross(left, up), left, up])

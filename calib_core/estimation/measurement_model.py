@@ -44,6 +44,9 @@ from calib_core.results.systematic_errors import (
     systematic_errors,
 )
 
+LEAST_SCORE = 1e-6
+"""Least probability of a candidate, so that its logarithm is finite. A choice: it counts as 28 in -2 log-likelihood."""
+
 OWN_SIGMA_RAD = np.deg2rad(0.5)
 """Standard deviation of each placement's elevation above or below the common plane: uneven ground."""
 
@@ -183,7 +186,7 @@ class Linearization:
         )
 
 
-_FREEDOM = 4.0  # of a measured position
+_FREEDOM = 4.0  # degrees of freedom of a measured position: of ten tapes, one is off by more than twice its sigma
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -428,7 +431,7 @@ def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: Calibratio
         first=np.concatenate([[0], np.cumsum([len(pair.candidates) for pair in pairs])]).astype(np.int64),
         reported=polar_from_cartesian(points),
         sigma_polar=sigma_polar,
-        log_score=np.log(np.clip(score, 1e-6, 1.0)),
+        log_score=np.log(np.clip(score, LEAST_SCORE, 1.0)),
         prior=_prior(options, flat=flat),
         log_outlier=np.log(click_density(pixels_px, sigma_px, camera)),
         returns=shared_returns(pairs, window_s=options.locating.window_s),
@@ -445,10 +448,10 @@ def _prior(options: CalibrationOptions, *, flat: bool) -> CameraPrior:
     return CameraPrior(np.array(measured.position_m), measured.sigma_m, True, height_sigma_m)
 
 
-_SAME_ELEVATION_RAD = np.deg2rad(0.01)
-_SAME_HEIGHT_M = 0.001
+_SAME_ELEVATION_RAD, _SAME_HEIGHT_M = np.deg2rad(0.01), 0.001
+"""What files round to: hundredths of a degree, and millimeters."""
 _LEAST_POSITIONS = 2
-_NEARLY_ALL = 0.9
+_NEARLY_ALL = 0.9  # share of the positions, a choice: one of ten may be wrong
 
 
 def is_flat(points_radar_m: Points3) -> bool:
@@ -478,7 +481,7 @@ def prior_rows(measurements: PairMeasurements, camera_from_radar: RigidTransform
     return np.concatenate([residual, -errors.values / errors.sigma]), rows
 
 
-_FAR = 1e6  # whitened residual of a position the camera cannot see
+_FAR = 1e6  # standard deviations: the whitened residual of a position the camera cannot see
 
 
 def linearize(

@@ -14,7 +14,7 @@ from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import associate
 from calib_core.estimation.leave_one_out import LeaveOneOut
-from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
+from calib_core.estimation.measurement_model import LEAST_SCORE, Linearization, PairMeasurements, pair_measurements
 from calib_core.measurements import Candidate, DataWarning, Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, sigma_polar_of
@@ -169,6 +169,7 @@ def excluded_by_residual(calibration: Calibration) -> list[DataWarning]:
     kept_px = [p.held_out_px if np.isfinite(p.held_out_px) else longer * p.distance_px for p in kept]
     lengths_px = np.array([pair.distance_px for pair in chosen])
     above = float((lengths_px[:, None] > np.array(kept_px)).sum()) - 0.5 * k * m
+    # variance of the number of pairs above (Wilcoxon, Mann and Whitney): k m (k + m + 1) / 12
     if above <= _BY_CHANCE * (k * m * (k + m + 1) / 12.0) ** 0.5:
         return []
     metrics = calibration.metrics
@@ -303,6 +304,6 @@ def _probabilities(calibration: Calibration, scores: Values, squared: Values, co
     density = np.zeros(len(scores))
     spread = np.sqrt(np.linalg.det(covariances[known]))
     density[known] = np.exp(-0.5 * squared[known]) / (2.0 * np.pi * spread)
-    weight = (1.0 - _NONE_OF_THEM) * np.clip(scores, 1e-6, 1.0) * density
+    weight = (1.0 - _NONE_OF_THEM) * np.clip(scores, LEAST_SCORE, 1.0) * density
     nothing = _NONE_OF_THEM / (camera.width_px * camera.height_px)
     return np.where(known, weight / (weight.sum() + nothing), np.nan)

@@ -15,19 +15,22 @@ from calib_core.measurements import DataWarning, Facts
 from calib_core.options import CalibrationOptions
 from calib_core.results.systematic_errors import OFF_MIDDLE, off_middle_px
 
+UNITS_M = {"centimeters": 0.01, "millimeters": 0.001, "feet": 0.3048}
+"""Meters per unit, by definition."""
+
 _FARTHEST_M = 100.0  # a reflector of a few decimetres is then a pixel or two wide
-_FARTHEST_CAMERA_M = 15.0
-_USUAL_RANGE_M = 8.0
-_UNITS = {"millimeters": 0.001, "centimeters": 0.01, "feet": 0.3048}
-_SIDEWAYS_RAD = np.deg2rad(60.0)
+_FARTHEST_CAMERA_M = 15.0  # a choice: sensors of one vehicle are closer, and 20 cm read as meters are not
+_USUAL_RANGE_M = 8.0  # a choice: the unit that brings the median range nearest to it is named
+_SIDEWAYS_RAD = np.deg2rad(60.0)  # degrees, a choice: within a usual field of view; exchanged axes make it 90
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
 _PART_OF_IMAGE = 0.5
 _FARTHEST_OFF_MIDDLE = 0.12  # of the width or height: cameras publish up to 8 %
+# ratios of width to height that sensors and screens have, by name
 _ASPECT_RATIOS = {"4:3": 4.0 / 3.0, "16:9": 16.0 / 9.0, "3:2": 1.5, "16:10": 1.6, "5:4": 1.25, "1:1": 1.0}
 _BETTER, _NEAR_MIDDLE = 9.2, 4.0
 """By how much another image fits the principal point better (a likelihood ratio of 100), and how well at least, both squared."""
-_LEAST_PAIRS = 8
+_LEAST_PAIRS = 8  # a choice: fewer are on one side of an image or radar by chance
 
 
 def implausible_input(
@@ -55,11 +58,11 @@ def _units(points_radar_m: Points3) -> list[DataWarning]:
     range_m = np.linalg.norm(points_radar_m, axis=1)
     if np.median(range_m) <= _FARTHEST_M:
         return []
-    unit = min(_UNITS, key=lambda name: abs(np.log(np.median(range_m) * _UNITS[name] / _USUAL_RANGE_M)))
+    unit = min(UNITS_M, key=lambda name: abs(np.log(np.median(range_m) * UNITS_M[name] / _USUAL_RANGE_M)))
     return [
         DataWarning(
             "units-suspected",
-            {"nearest": float(range_m.min()), "farthest": float(range_m.max()), "unit": unit, "factor": _UNITS[unit]},
+            {"nearest": float(range_m.min()), "farthest": float(range_m.max()), "unit": unit, "factor": UNITS_M[unit]},
         )
     ]
 

@@ -34,8 +34,9 @@ POWER = 0.95
 """Share of the changes of a noticeable size that are noticed."""
 
 _SAME_FIT = 1.0  # squared distance of a pose from that of its own pairs, in standard deviations
-_MOST_FREEDOM = 1e6
+_MOST_FREEDOM = 1e6  # degrees of freedom for a known noise: F of infinitely many is NaN in SciPy
 _HALVINGS, _MOST_NONCENTRAL = 60, 1e4
+"""Number of steps, which reach the rounding of float64, and the end of the search: the square of 100 standard deviations."""
 _OF_CLICKS = ("click_right_px", "click_down_px")
 _OWNERS: Mapping[str, "Owner"] = {
     "azimuth_scale": "radar",
@@ -99,7 +100,7 @@ class PoseChange:
         moves = _unit_moves(self.first)
         information = np.einsum("ia,ij,ja->a", moves, np.linalg.inv(self.covariance), moves)
         sizes = np.sqrt(_noncentral(self.limit(level), self.freedom) / information)
-        return np.concatenate([np.degrees(sizes[:3]), 100.0 * sizes[3:]])
+        return np.concatenate([np.degrees(sizes[:3]), 100.0 * sizes[3:]])  # [cm/m]
 
 
 def sigmas_of(p_value: float, squared: float) -> float:
@@ -268,11 +269,11 @@ def _joined(first: _Equations, second: _Equations, shared: Set[Owner]) -> PoseCh
             if unknown.sigma > 0.0:
                 key = (unknown.name, -1 if unknown.owner in shared else which)
                 if key not in places:
-                    places[key] = 12 + len(places)
+                    places[key] = 12 + len(places)  # after two poses: the number of their unknowns
                     sigmas.append(unknown.sigma)
                 spread[unknown.column, places[key]] = 1.0
         spreads.append(spread)
-    size = 12 + len(places)
+    size = 12 + len(places)  # number of unknowns of two poses, and others
     prior = np.zeros((size, size))
     prior[12:, 12:] = np.diag(np.array(sigmas) ** -2.0)
     rows = [one.rows @ spread[:, :size] for one, spread in zip((first, second), spreads, strict=True)]

@@ -77,14 +77,20 @@ def joined_poses(several: Sequence[Poses]) -> Poses:
     )
 
 
-NEAR_OUTLIER_FACTOR = 5.0
-"""How many times noisier a near outlier is."""
+NEAR_OUTLIER_SHARE, NEAR_OUTLIER_FACTOR = 0.01, 5.0
+"""Of the pairs that are not outliers anywhere on the image, the share of near outliers, and how many times noisier these are."""
 
-_NEAR_OUTLIER_SHARE = 0.01
-_SHARES = np.array([0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.98])
-_PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # of a beta distribution of the share
+PRIOR_INLIERS, PRIOR_OUTLIERS = 3.0, 0.5
+"""Pairs that the prior of the inlier share counts for: a beta distribution."""
+
+NEAR_SIGMAS = 6.0
+"""Standard deviations beyond which a pair does not move its own true position."""
+
+LARGEST_EXPONENT = 500.0
+"""Of exp(), for log odds and logarithms of likelihood ratios: float64 ends at 709, and products need the rest."""
+
+_SHARES = np.array([0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.98])  # of inliers: a grid, 0.5 to 1.1 apart in log odds
 _TAIL = 4.0  # the weak camera prior is a Cauchy distribution in three dimensions: density (1 + d^2 / sigma^2)^-2
-_NEAR = 6.0  # standard deviations beyond which a pair does not move its own true position
 _FAR_PX = 1e6  # residual of a position the camera cannot see
 
 
@@ -131,7 +137,7 @@ class PairTerms:
 
     def outlier_probabilities(self, share: float) -> np.ndarray:
         """Return the probability (s, n) that each pair is an outlier anywhere, for a share of inliers."""
-        return np.asarray(1.0 / (1.0 + share / (1.0 - share) * np.exp(np.minimum(self.pair, 500.0))))
+        return np.asarray(1.0 / (1.0 + share / (1.0 - share) * np.exp(np.minimum(self.pair, LARGEST_EXPONENT))))
 
     def whitened(self) -> np.ndarray:
         """Return residual and d pixel / d (dt, dtheta), whitened by the noise: (s, 7, 2, m)."""
@@ -170,7 +176,7 @@ class PosePosterior:
             poses: s of them.
             log_scales: (s, 4) logarithms of the noise over the assumed one.
         """
-        ratio = np.exp(np.minimum(self.pair_terms(poses, log_scales).pair, 500.0))
+        ratio = np.exp(np.minimum(self.pair_terms(poses, log_scales).pair, LARGEST_EXPONENT))
         mixed = np.log(_SHARES[:, None, None] * (ratio - 1.0) + 1.0).sum(axis=-1)
         costs = -2.0 * np.logaddexp.reduce(mixed + _LOG_SHARE_PRIOR[:, None], axis=0) + self.prior_costs(poses)
         return np.asarray(costs + ((log_scales @ _SCALES_INFORMATION) * log_scales).sum(axis=1))
@@ -196,9 +202,9 @@ class PosePosterior:
         squared = (linear.residual_px * linear.solved()).sum(axis=1)
         level = measurements.log_score - self.log_outlier - np.log(2.0 * np.pi)
         level = level - 0.5 * self._log_volumes(factors)
-        inlier = level - 0.5 * squared + np.log1p(-_NEAR_OUTLIER_SHARE)
+        inlier = level - 0.5 * squared + np.log1p(-NEAR_OUTLIER_SHARE)
         wider = NEAR_OUTLIER_FACTOR**2
-        near = level - 0.5 * squared / wider + np.log(_NEAR_OUTLIER_SHARE / wider)
+        near = level - 0.5 * squared / wider + np.log(NEAR_OUTLIER_SHARE / wider)
         pair = np.logaddexp(inlier, near)
         if not measurements.one_to_one:
             pair = np.logaddexp.reduceat(pair, measurements.first[:-1], axis=-1)
@@ -226,7 +232,7 @@ class PosePosterior:
         measured = self.candidates.polar
         first = self._linearized_at(poses, factors, measured[:, None])
         solved = first.solved()
-        near = (first.residual_px * solved).sum(axis=1) < _NEAR**2
+        near = (first.residual_px * solved).sum(axis=1) < NEAR_SIGMAS**2
         pull = (first.d_polar * solved[:, :, None]).sum(axis=1).transpose(1, 0, 2)  # (3, s, m)
         variances = factors.T[1:, :, None] * self.candidates.sigma_polar[:, None] ** 2
         return self._linearized_at(poses, factors, measured[:, None] + np.where(near, variances * pull, 0.0))
@@ -273,7 +279,7 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform) ->
 def _log_share_prior() -> Values:
     """Return the logarithm of the beta prior's weight of each of the shares, which are spaced in their log odds."""
     odds = np.log(_SHARES / (1.0 - _SHARES))
-    weights = _PRIOR_INLIERS * np.log(_SHARES) + _PRIOR_OUTLIERS * np.log1p(-_SHARES) + np.log(np.gradient(odds))
+    weights = PRIOR_INLIERS * np.log(_SHARES) + PRIOR_OUTLIERS * np.log1p(-_SHARES) + np.log(np.gradient(odds))
     return np.asarray(weights - np.logaddexp.reduce(weights))
 
 

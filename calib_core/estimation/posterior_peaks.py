@@ -12,9 +12,11 @@ import numpy as np
 
 from calib_core.arrays import Flags, Matrix66, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.gnc import LEAST_INFORMATION, damped_steps
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.pose_posterior import (
+    LARGEST_EXPONENT,
     NEAR_OUTLIER_FACTOR,
     PairTerms,
     PosePosterior,
@@ -25,12 +27,14 @@ from calib_core.estimation.pose_posterior import (
 )
 from calib_core.geometry import RigidTransform
 
-_HYPOTHESES, _REFINED_HYPOTHESES = 80, 16
-_MOST_PEAKS = 8
+_HYPOTHESES, _REFINED_HYPOTHESES, _MOST_PEAKS = 80, 16, 8
+"""Number of poses drawn, of those refined as the most likely, and of peaks that are kept. A choice: more find rarer peaks in
+more time."""
+
 _SAME = 4.0  # squared distance, in standard deviations
 _ROUNDS_APART, _ROUNDS_TOGETHER = 5, 3  # without a pair each, then with all
-_SINGULAR, _LEAST_INFORMATION = 1e-12, 1e-12
-"""The smallest eigenvalue of a Hessian with a unit diagonal that is more than rounding, and the least entry of a diagonal."""
+_SINGULAR = 1e-12
+"""The smallest eigenvalue of a Hessian with a unit diagonal that is more than rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,15 +140,12 @@ def _refined(
 
 def _covariances(hessians: np.ndarray) -> np.ndarray:
     """Return the inverses (k, 6, 6) of Hessians; zeros for one that is singular to rounding: no peak is there."""
-    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), _LEAST_INFORMATION))
+    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), LEAST_INFORMATION))
     scaled = hessians / (scale[:, :, None] * scale[:, None, :])
     values, vectors = np.linalg.eigh(scaled)
     peaked = values[:, 0] > _SINGULAR
     inverse = (vectors / np.where(peaked[:, None], values, 1.0)[:, None, :]) @ vectors.swapaxes(1, 2)
     return np.where(peaked[:, None, None], inverse / (scale[:, :, None] * scale[:, None, :]), 0.0)
-
-
-_LARGEST_TURN_RAD, _LARGEST_SHIFT_M = 0.3, 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,10 +188,11 @@ def refine_poses(
     for _ in range(rounds):
         terms = posterior.pair_terms(poses, log_scales)
         hessians, gradients = _normal_equations(posterior, poses, terms, share, counts)
-        poses = poses.perturbed(_steps(hessians, gradients))
+        # steps, a choice: about half as far as in GNC, whose first radii are wide
+        poses = poses.perturbed(damped_steps(hessians, gradients, largest_turn_rad=0.3, largest_shift_m=1.0))
     terms = posterior.pair_terms(poses, log_scales)
     hessians, _ = _normal_equations(posterior, poses, terms, share, counts)
-    mixed = np.log1p(share * np.expm1(np.minimum(terms.pair, 500.0)))
+    mixed = np.log1p(share * np.expm1(np.minimum(terms.pair, LARGEST_EXPONENT)))
     evidence = np.where(counts, mixed, 0.0).sum(axis=1) - 0.5 * posterior.prior_costs(poses)
     return Modes(poses, hessians, 1.0 - terms.outlier_probabilities(share), evidence)
 
@@ -201,19 +203,10 @@ def _normal_equations(
     """Return Hessians (k, 6, 6) and right-hand sides (k, 6), every candidate row weighted by its probability."""
     outlier = terms.outlier_probabilities(share) / (1.0 - share) * share * counts
     per_row = outlier if posterior.measurements.one_to_one else outlier[:, posterior.measurements.owner]
-    kinds = np.exp(np.minimum(terms.inlier, 500.0)) + np.exp(np.minimum(terms.near, 500.0)) / NEAR_OUTLIER_FACTOR**2
+    inlier, near = (np.exp(np.minimum(log_density, LARGEST_EXPONENT)) for log_density in (terms.inlier, terms.near))
+    kinds = inlier + near / NEAR_OUTLIER_FACTOR**2
     rows = terms.whitened() * np.sqrt(per_row * kinds)[:, None, None, :]
     rows = rows.reshape(*rows.shape[:2], -1)
     product = rows @ np.swapaxes(rows, 1, 2)
     prior_hessians, prior_gradients = posterior.prior_information(poses)
     return product[:, 1:, 1:] + prior_hessians, product[:, 1:, 0] + prior_gradients
-
-
-def _steps(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-    """Solve for steps (k, 6) of limited length, slightly damped."""
-    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), 1e-12))
-    scaled = hessians / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(6)
-    steps = np.linalg.solve(scaled, (gradients / scale)[:, :, None])[:, :, 0] / scale
-    turns, shifts = np.linalg.norm(steps[:, 3:], axis=1), np.linalg.norm(steps[:, :3], axis=1)
-    longest = np.maximum(np.maximum(turns / _LARGEST_TURN_RAD, shifts / _LARGEST_SHIFT_M), 1.0)
-    return np.asarray(steps / longest[:, None])
