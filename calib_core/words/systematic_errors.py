@@ -98,7 +98,7 @@ ERRORS: Mapping[str, ErrorWords] = {
     "elevation_lean": ErrorWords(
         "elevation lean",
         "radar elevations that lean with the azimuth",
-        _by(f"{_HEIGHTS},", SpreadPlacements("heights")),
+        _by(_HEIGHTS, SpreadPlacements("heights")),
         100.0,
         "%",
     ),
