@@ -43,8 +43,8 @@ _DIFFERENT = 0.25  # share of the tests of a kind that count: neighboring shapes
 _COST = 2.0  # of the statistic, for each unknown of a cause (Akaike)
 _PLAUSIBLE: Mapping[str, float] = {
     "range": 0.5,
-    "azimuth": np.deg2rad(0.3),
-    "elevation": np.deg2rad(0.3),
+    "azimuth": np.deg2rad(0.2),
+    "elevation": np.deg2rad(0.2),
     "column": 5.0,
     "row": 5.0,
     "focal length": 0.02,

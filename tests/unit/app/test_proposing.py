@@ -91,7 +91,7 @@ class Watched:
             return now.progress.stage == stage and (open_ones is None or _count(now) == open_ones)
 
         with self.told:
-            assert self.told.wait_for(holds, timeout=20), (self.job.snapshot.progress.stage, _count(self.job.snapshot))
+            assert self.told.wait_for(holds, timeout=60), (self.job.snapshot.progress.stage, _count(self.job.snapshot))
         return self.job.snapshot
 
 
@@ -170,7 +170,7 @@ def test_why_there_are_none_is_said(finding, watched):
     watched.job.stop()
     watched.job.ask(replace(WISH))
     with watched.told:
-        assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.progress.problem, timeout=20)
+        assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.progress.problem, timeout=60)
 
 
 def test_nothing_is_asked_of_a_job_that_is_closed(finding, watched):
