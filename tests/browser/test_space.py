@@ -64,7 +64,7 @@ def test_without_webgl_the_pane_says_so_and_shows_the_returns_from_above(
     none += "function (kind, ...more) { return kind === 'webgl2' ? null : made.call(this, kind, ...more); };"
     page = open_page(server.url, viewport=SMALL, script=none)
     page.until("document.querySelector('.space-why').textContent.includes('WebGL2')")
-    assert page.page.locator("#space #birdseye").is_visible()
+    page.page.locator("#space #birdseye").wait_for(state="visible")
     assert page.page.get_attribute("#space-view", "src") is None
     page.until("__cocalib.state.placementsKnown")
     assert page.value("document.getElementById('birdseye').width") > 0
