@@ -27,6 +27,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 UNCERTAIN = 4.0
 """Standard deviation of a place whose apex is not seen [px]."""
 READY = "__cocalib.state.proposals?.progress.stage === 'ready'"
+_LOOKING_S = 120.0  # until all images are looked at, beside other tests
 ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
 
 
@@ -150,14 +151,14 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
     page.press("Enter")
     page.until("__cocalib.state.view.clicks.length === 1")
     images.allowed.set()
-    page.until(READY)
+    page.until(READY, _LOOKING_S)
     first = page.view["clicks"][0]
     assert (first["mark"], first["sigma_px"]) == ("snapped", pytest.approx(0.4))
     assert violations(page) == []
 
     count, accepted, order = 2, 1, []
     while (done := page.value("__cocalib.state.view.clicks.length")) < 20:
-        page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
+        page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)", _LOOKING_S)
         if page.value("__cocalib.shownOffer() === null"):
             page.press("n")
             page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
@@ -206,7 +207,7 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
 ) -> None:
     images.allowed.set()
     page = open_page(proposing.url)
-    page.until(READY)
+    page.until(READY, _LOOKING_S)
     page.press("n")
     while (
         guide(page) and page.value("__cocalib.shownOffer().row.placement") != 4
@@ -232,7 +233,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
 ) -> None:
     images.allowed.set()
     page = open_page(proposing.url)
-    page.until(READY)
+    page.until(READY, _LOOKING_S)
     page.press("n")
     first, before = guide(page), left(page)
     placement = page.value("__cocalib.shownOffer().row.placement")
@@ -345,7 +346,7 @@ def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_
 ) -> None:
     images.allowed.set()
     page = open_page(proposing.url)
-    page.until(READY)
+    page.until(READY, _LOOKING_S)
     page.press("n")
     guide(page)
     frame = page.value("__cocalib.state.cursor")
