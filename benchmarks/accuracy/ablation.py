@@ -7,7 +7,9 @@ the radar's angles smooth over direction. A part is left out by an option, or by
 import argparse
 import os
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from types import ModuleType
 from typing import Any
 from unittest.mock import patch
@@ -62,15 +64,9 @@ def _solve(case: Shared, part: str, trials: list[int]) -> list[Figures]:
     without, figures = WITHOUT[part], []
     for trial in trials:
         drawn = draw_shared(case, trial)
-
-        def answer() -> Any:
-            return calibrate_pairs(drawn.pairs, drawn.camera, without.options)  # noqa: B023  called at once
-
-        if without.module is None:
-            outcome = solved_or_refused(answer)
-        else:
-            with patch.object(without.module, without.name, without.value):
-                outcome = solved_or_refused(answer)
+        replaced = patch.object(without.module, without.name, without.value) if without.module else nullcontext()
+        with replaced:
+            outcome = solved_or_refused(partial(calibrate_pairs, drawn.pairs, drawn.camera, without.options))
         figures.append(outcome_figures(outcome, drawn.camera_from_radar))
     return figures
 

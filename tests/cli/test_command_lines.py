@@ -20,9 +20,9 @@ _MADE = Made(placements=20)
 _POSITION_M = tuple(f"{value:.6f}" for value in _MADE.camera_from_radar.inverse().translation_m)
 _TABLE = [
     (0, "solve --pairs good-pairs.json --out o.json --require usable", "verdict: usable"),
-    (1, "solve --pairs few.json --out o.json", "2"),
+    (1, "solve --pairs few.json --out o.json", "2 of"),
     (0, "solve made.mcap --clicks off.json --out o.json", "\ndisagrees: c5: "),
-    (1, "solve made.mcap --clicks three.json --out o.json", "3"),
+    (1, "solve made.mcap --clicks three.json --out o.json", "3 of"),
     (2, "solve", "--clicks"),
     (2, "solve a.bag", "--clicks"),
     (2, "solve --pairs", "--pairs needs a value: --pairs FILE; see cocalib solve --help"),
@@ -76,7 +76,7 @@ _TABLE = [
     (2, "solve made.mcap --clicks clicks.json --camera word.yaml", "found no keys"),
     (2, "solve made.mcap --clicks clicks.json --out clicks.json", "is also an input, which is never changed"),
     (0, "solve made.mcap --clicks clicks.json --camera bare.yaml --out o.json", "bare.yaml states no distortion"),
-    (1, "solve --pairs commas.csv --camera camera.yaml", "1"),
+    (1, "solve --pairs commas.csv --camera camera.yaml", "1 of at least 4"),
     (2, "solve --pairs camera.yaml --camera camera.yaml", "no columns u_px and v_px"),
     (2, "solve a.bag --clicsk=b.json", "unknown option --clicsk; did you mean --clicks"),
     (2, "solve a.bag --propose --auto", "--propose solves nothing: give a recording"),

@@ -149,6 +149,7 @@ def test_who_excludes_the_longest_residuals_is_told_with_the_error_of_all(method
     assert verdict_on(cut).excluded is excluded
     read = read_calibration(calibration_text(cut)).calibration
     assert verdict_on(read).excluded is not None
+    assert "excluded by residual" in str(verdict_on(read))
     assert warning_remark(excluded).action == ReviewPairs(tuple(excluded.facts["ids"]))
     for chosen in (ids[-5:], ids[::4], ids[:1]):
         other = calibrate_pairs(simulated.pairs, simulated.camera, options, frozenset(chosen))

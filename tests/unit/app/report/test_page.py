@@ -131,6 +131,7 @@ def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_ro
     unknown = np.full((6, 6), np.nan)
     words = _words(subject_for(project_root, replace(calibration, covariance=unknown, options=options)))
     assert "coarse" in words
+    assert "states no error" in words
     assert "No error bars" in words
     assert "nothing to draw" in words
     assert " ± " not in words.split("Warnings")[0].replace("Bars: ± two", "")
