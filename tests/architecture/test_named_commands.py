@@ -17,7 +17,7 @@ PROSE = {"again", "boxes-1", "cookie", "knows", "reads", "runs", "therefore", "w
 """Words that follow the program's name in sentences that do not name a command."""
 
 _TRANSFORM_PUBLISHER = ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")
-_RERUN = ("bind", "port", "serve-web", "web-viewer-port")
+_RERUN = ("bind", "port")
 _CHROMIUM = (
     *("disable-background-networking", "disable-dev-shm-usage", "disable-extensions", "disable-gpu", "headless"),
     *("host-resolver-rules", "no-first-run", "no-pdf-header-footer", "no-sandbox", "print-to-pdf", "user-data-dir"),

@@ -230,7 +230,7 @@ _PLACEHOLDERS = {
     "--tree drive.mcap": "--tree driver.yaml",  # drive.mcap has the calibration in its own tree
 }
 _NOT_RUN = {
-    r"show (?!.*--out)": "opens a window; tests/browser/test_rerun_viewer.py runs it",
+    r"show (?!.*--out)": "opens a window",
     r"demo$": "serves until it is ended; another test here runs it",
 }
 """Command lines that are left out, and why."""

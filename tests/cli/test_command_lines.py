@@ -233,7 +233,6 @@ _TABLE = [
     (2, "show absent.mcap", ""),
     (2, "show absent.mcap --out o.mp4", "absent.mcap"),
     (2, "show a.bag --out a.mp4 --trail 3", "--calibration FILE is missing"),
-    (2, "show a.bag --out a.mp4 --web", "remove --out to open it"),
     (2, "show made.mcap --out o.rrd", "--calibration FILE is missing"),
     (2, "show made.mcap --out o.mp4 --calibration good.json --trail -1", "--trail -1: give a number of scans"),
     (2, "show made.mcap --calibration good.json --out o.mcap", "o.mcap"),

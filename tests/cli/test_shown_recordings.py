@@ -48,5 +48,4 @@ def test_rerun_without_a_display_names_other_ways(cocalib, solved, monkeypatch):
     answer = cocalib("show", solved.with_name("made.mcap"), "--calibration", solved)
     assert answer.code == 2
     assert "there is no display" in answer.err
-    assert "--web" in answer.err
     assert "--out FILE.rrd" in answer.err

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from calib_core.errors import InputError
 from calib_core.input_files import read_text
-from cocalib.cli.flags import INPUT, File, OutFile, Output, OutputFlags, Switch, called
+from cocalib.cli.flags import INPUT, File, OutFile, Output, OutputFlags, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, Recorded, RecordedFlags
 from cocalib.platform.files import whole_path
@@ -43,10 +43,6 @@ class Show:
     """What the colors of returns show."""
     trail: int = _TRAIL_SCANS
     """In a video: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
-    web: Switch = False
-    """Serve Rerun's viewer for a browser on this machine, instead of opening a window."""
-    port: Annotated[int, called("PORT")] = 0
-    """With --web: the port; 0 takes a free one."""
     recorded: Recorded = field(default_factory=RecordedFlags)
     output: Output = field(default_factory=OutputFlags)
 
@@ -54,8 +50,6 @@ class Show:
         """Show or write it; return the exit code."""
         if self.out is None:
             return self._show()
-        if self.web or self.port:
-            raise InputError("--web and --port show a window; remove --out to open it")
         if self.out.suffix.lower() == ".rrd":
             return self._write_rrd(self.out)
         return self._write_frames(self.out) if self.calibration is None else self._write_overlay(self.out)
@@ -65,13 +59,12 @@ class Show:
         from cocalib.rerun import open_window, require_display, require_sdk, write_view
 
         require_sdk()
-        if not self.web:
-            require_display(os.environ)
+        require_display(os.environ)
         with tempfile.TemporaryDirectory(prefix="cocalib-") as folder:
             path = Path(folder) / "view.rrd"
             with self._view() as view, progress_bar("writing frames") as progress:
                 write_view(view, path, progress=progress)
-            return _serve(path, self.port) if self.web else open_window(path)
+            return open_window(path)
 
     def _write_rrd(self, out: Path) -> int:
         from cocalib.rerun import require_sdk, write_view
@@ -164,16 +157,3 @@ class Show:
                     recording, calibration, self.colour, clicks=clicks, boxes=boxes, against=against, progress=progress
                 )
             yield view
-
-
-def _serve(path: Path, port: int) -> int:
-    from cocalib.rerun.viewer import serve_view
-
-    with serve_view(path, port) as served:
-        print(f"open {served.url}", flush=True)
-        print("Ctrl+C ends it", flush=True)
-        try:
-            served.server.serve_forever()
-        except KeyboardInterrupt:
-            return 0
-    return 0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, BinaryIO
 from calib_core.recordings import SkippedFrames
 from cocalib.platform.files import writing_whole
 from cocalib.recorded_view import RecordedView
-from cocalib.rerun.sdk import require_sdk
+from cocalib.rerun.viewer import require_sdk
 
 if TYPE_CHECKING:
     import rerun as rr

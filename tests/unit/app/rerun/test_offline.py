@@ -1,21 +1,17 @@
 """Nothing of Rerun's reaches the internet, and everything else works where rerun-sdk is missing.
 
 `strace -f -e trace=connect` of the viewer in this environment shows connections to 127.0.0.1 only; without it, it asks a
-name server. What the page of the web viewer asks for is seen in tests/browser/test_rerun_viewer.py.
+name server.
 """
 
-import http.client
 import subprocess
 import sys
-import threading
-from urllib.parse import urlsplit
 
 import pytest
 
 from calib_core.errors import InputError
 from cocalib.rerun import require_display
-from cocalib.rerun.sdk import offline_environment
-from cocalib.rerun.viewer import POLICY, serve_view
+from cocalib.rerun.viewer import offline_environment
 
 BLOCKED = """
 import sys
@@ -69,36 +65,3 @@ def test_without_a_display_other_ways_are_named():
         require_display({}, "linux")
     for environment, platform in (({"DISPLAY": ":0"}, "linux"), ({"WAYLAND_DISPLAY": "w"}, "linux"), ({}, "darwin")):
         require_display(environment, platform)
-
-
-def test_the_web_viewer_is_served_to_who_has_the_link_under_a_policy(tmp_path):
-    pytest.importorskip("rerun_cli", reason="there is no wheel of rerun-sdk for this machine")
-    view = tmp_path / "view.rrd"
-    view.write_bytes(b"RRF2" + bytes(1000))
-    with serve_view(view) as served:
-        thread = threading.Thread(target=served.server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            link = urlsplit(served.url)
-            assert link.hostname == "127.0.0.1"
-            assert fetched(link.netloc, f"{link.path}view.rrd") == (200, POLICY, view.read_bytes())
-            code, policy, page = fetched(link.netloc, link.path)
-            assert (code, policy) == (200, POLICY)
-            assert b"re_viewer" in page
-            for path in ("/", "/view.rrd", f"/{'x' * 22}/view.rrd", f"{link.path}../view.rrd", f"{link.path}etc"):
-                assert fetched(link.netloc, path)[0] == 404
-            assert fetched(link.netloc, f"{link.path}view.rrd", host="evil.example")[0] == 404
-        finally:
-            served.server.shutdown()
-            thread.join()
-
-
-def fetched(netloc: str, path: str, host: str | None = None) -> tuple[int, str | None, bytes]:
-    """Return the answer to a request: its code, its policy and its content."""
-    connection = http.client.HTTPConnection(netloc)
-    try:
-        connection.request("GET", path, headers={"Host": host or netloc})
-        answer = connection.getresponse()
-        return answer.status, answer.getheader("Content-Security-Policy"), answer.read()
-    finally:
-        connection.close()

@@ -90,7 +90,9 @@ def test_a_missing_calibration_is_explained(ask):
 def test_rerun_is_offered_as_a_command_where_it_is_installed_and_has_a_window(file, ask, monkeypatch):
     solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
     for installed, display in ((True, ":1"), (True, ""), (False, "")):
-        monkeypatch.setattr("cocalib.rerun.sdk.find_spec", lambda _name, found=installed: object() if found else None)
+        monkeypatch.setattr(
+            "cocalib.rerun.viewer.find_spec", lambda _name, found=installed: object() if found else None
+        )
         monkeypatch.setenv("DISPLAY", display)
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
         offer = json.loads(ask(solved, "/api/rerun.json").body)
