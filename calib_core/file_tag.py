@@ -1,13 +1,10 @@
 """How a file shows that cocalib wrote it: a schema, a statement, or the tag in a comment or in its metadata."""
 
 import re
-import struct
-import zlib
 
 TAG = "written by cocalib"
 """Where a file of ours states neither a schema nor what `statement` writes."""
 OTHER_KIND = "cocalib"
-_PNG_HEADER_BYTES = 33
 _SCHEMA = re.compile(rb'\s*{\s*"schema": ?"(cocalib/[\w-]+)"')
 _OURS = re.compile(
     TAG.encode()
@@ -18,13 +15,6 @@ _OURS = re.compile(
     + rb'|<testsuites name="cocalib check">|!cocalib"|MAT-file, cocalib,'  # JUnit, Foxglove's layout, MATLAB
     + rb"|[\0-\x08\x0e-\x1f]cocalib"  # a length before it: the library of an MCAP file, the application of an .rrd
 )
-
-
-def tagged_png(data: bytes) -> bytes:
-    """Return a PNG file with the tag in a chunk of text after its header."""
-    chunk = b"tEXtSoftware\0" + TAG.encode()
-    framed = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return data[:_PNG_HEADER_BYTES] + framed + data[_PNG_HEADER_BYTES:]
 
 
 def kind_of(data: bytes) -> str:

@@ -31,7 +31,6 @@ _USES = {
     "proposals-1": "confirm them on the page, or copy the clicks that you have looked at into a clicks-1 file",
     "boxes-1": "give it with --boxes FILE",
     "labels-1": "give it with --labels FILE",
-    "board-views-1": "give it with cocalib intrinsics --views FILE",
 }
 """What our own files are for, by their schema."""
 

@@ -15,9 +15,7 @@ from calib_core.interchange.own.documents import (
     PairsDocument,
 )
 from calib_core.interchange.own.lens_documents import (
-    BOARD_VIEWS_SCHEMA,
     INTRINSICS_SCHEMA,
-    BoardViewsDocument,
     IntrinsicsDocument,
 )
 from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
@@ -36,7 +34,6 @@ _DOCUMENTS: dict[str, Any] = {
     CALIBRATION_SCHEMA: CalibrationDocument,
     BOXES_SCHEMA: BoxesDocument,
     LABELS_SCHEMA: LabelsDocument,
-    BOARD_VIEWS_SCHEMA: BoardViewsDocument,
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
     BASELINE_SCHEMA: Baseline,

@@ -1,6 +1,5 @@
 """Images of hypotheses: one frame with the radar's returns where each meaning of a file's numbers puts them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -8,7 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Points3
 from calib_core.errors import InputError
-from calib_core.file_tag import tagged_png
 from calib_core.measurements import TimeNs
 
 if TYPE_CHECKING:
@@ -16,13 +14,8 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.recordings import Recording
 
-_TILE_WIDTH_PX = 560
-_CAPTION_PX, _LINE_PX = 58, 19
-_ACROSS = 3
 _WITHIN_S = 0.3
-_FONT_SCALE = 0.4
 _NEAR_M, _FAR_M = 2.0, 40.0
-_INK, _PAPER = (30, 30, 30), (245, 245, 245)
 _QUALITY = 85
 
 
@@ -71,19 +64,18 @@ class OpenMeaning:
     shown: int | None = None
 
 
-def frame_with_returns(recording: "Recording", camera: "Camera", index: int | None = None) -> FrameWithReturns:
+def frame_with_returns(recording: "Recording", camera: "Camera", index: int) -> FrameWithReturns:
     """Read a frame and the returns of the scan nearest to it.
 
     Args:
         recording: with images and a radar.
         camera: the intrinsics of its images.
-        index: of the frame; None takes the one in the middle.
+        index: of the frame.
 
     Raises:
         InputError: the intrinsics are those of images of another size.
         RecordingError: the frame cannot be read.
     """
-    index = len(recording.image_times) // 2 if index is None else index
     image = recording.image(index)
     if image.shape[:2] != (camera.height_px, camera.width_px):
         height_px, width_px = image.shape[:2]
@@ -97,7 +89,7 @@ def frame_with_returns(recording: "Recording", camera: "Camera", index: int | No
     return FrameWithReturns(image, points_radar_m[np.isfinite(points_radar_m).all(axis=1)], camera)
 
 
-def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TILE_WIDTH_PX) -> np.ndarray:
+def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int) -> np.ndarray:
     """Draw the returns of a frame where a hypothesis puts them, nearer ones larger and warmer; uint8 (h, w, 3)."""
     import cv2
 
@@ -114,11 +106,6 @@ def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TIL
     return np.asarray(drawn)
 
 
-def returns_in_image(frame: FrameWithReturns, hypothesis: "Hypothesis") -> str:
-    """Return how many of the returns a hypothesis puts into the image."""
-    return f"{len(_pixels_and_ranges(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the image"
-
-
 def _pixels_and_ranges(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple[float, float], float]]:
     """Return the pixel and the range of each return that is in the image."""
     if not len(frame.points_radar_m):
@@ -130,40 +117,6 @@ def _pixels_and_ranges(frame: FrameWithReturns, hypothesis: "Hypothesis") -> lis
     return [
         ((float(u), float(v)), max(float(range_m), 1e-3)) for (u, v), range_m in zip(pixels_px, ranges_m, strict=True)
     ]
-
-
-def contact_sheet(frame: FrameWithReturns, hypotheses: Sequence["Hypothesis"]) -> np.ndarray:
-    """Draw each hypothesis over the frame, with its number, its score and what it means; uint8 (h, w, 3)."""
-    tiles = [
-        np.vstack([_caption(frame, number, hypothesis), tile(frame, hypothesis)])
-        for number, hypothesis in enumerate(hypotheses, 1)
-    ]
-    blank = np.full_like(tiles[0], _PAPER[0])
-    tiles += [blank] * (-len(tiles) % min(_ACROSS, len(tiles)))
-    rows = [tiles[at : at + _ACROSS] for at in range(0, len(tiles), _ACROSS)]
-    return np.vstack([np.hstack(row) for row in rows])
-
-
-def _caption(frame: FrameWithReturns, number: int, hypothesis: "Hypothesis") -> np.ndarray:
-    import cv2
-
-    strip = np.full((_CAPTION_PX, _TILE_WIDTH_PX, 3), _PAPER, np.uint8)
-    lines = (
-        f"{number}: {hypothesis.key}",
-        f"{hypothesis.score}; {returns_in_image(frame, hypothesis)}",
-        hypothesis.mounting,
-    )
-    for row, line in enumerate(lines):
-        at = 6, 15 + row * _LINE_PX
-        cv2.putText(strip, line[:100], at, cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
-    return strip
-
-
-def png(image: np.ndarray) -> bytes:
-    """Return an image as a PNG file of ours."""
-    import cv2
-
-    return tagged_png(bytes(cv2.imencode(".png", image)[1]))
 
 
 def jpeg(image: np.ndarray) -> bytes:

@@ -119,8 +119,6 @@ _TABLE = [
         "omit --as",
     ),
     (2, "import rig.json --out o.json --camera camera.yaml", "choose one with --pose NAME: 'front', 'rear'"),
-    (2, "import unclear.json --sheet o.png", "give it with --recording RECORDING"),
-    (2, "import unclear.json --sheet o.png --recording made.mcap --at 1000", "give a time in them"),
     (2, "import good.json --out o.json --camera huge.json", "more than 100 digits"),
     (3, "import bare.txt --camera camera.yaml --out o.json", "note: taken as camera_from_radar,optical,m ("),
     (3, "import contradictory.json --out o.json", ""),

@@ -48,14 +48,8 @@ _OUTPUTS = {
     ),
     "watch.update": ("watch calibration.json made.mcap --update {}", ".json", "calibration.json"),
     "import.out": ("import pose.urdf --camera camera.yaml --out {}", ".json", "camera.yaml"),
-    "import.sheet": (
-        "import pose.txt --recording made.mcap --camera camera.yaml --out o.json --sheet {}",
-        ".png",
-        "pose.txt",
-    ),
     "intrinsics.out": ("intrinsics camera.yaml --to kalibr --out {}", ".yaml", "camera.yaml"),
     "intrinsics.out, board": (f"{_BOARD} --out {{}}", ".yaml", "board/a.png"),
-    "intrinsics.views": (f"{_BOARD} --views {{}}", ".json", "board/a.png"),
     "intrinsics.report": (f"{_BOARD} --report {{}}", ".html", "board/a.png"),
     "session.out": ("session export drive.cocalib-session --out {}", ".json", "drive.cocalib-session/journal.jsonl"),
     "show.out": ("show made.mcap --out {}", ".mp4", "made.mcap/made.mcap.mcap"),
@@ -63,10 +57,10 @@ _OUTPUTS = {
     "show.out, rrd": ("show made.mcap --calibration calibration.json --out {}", ".rrd", "calibration.json"),
 }
 """A command for each output: how it is typed, the suffix, and a file that it reads."""
-_FOLDERS = {"batch.out", "simulate.out", "export.out", "intrinsics.rectified"}
+_FOLDERS = {"batch.out", "simulate.out", "export.out"}
 _UNSOLVED = {
     *("solve.clicks_out", "solve.out, proposals", "watch.update"),
-    *("intrinsics.out, board", "intrinsics.views", "intrinsics.report"),
+    *("intrinsics.out, board", "intrinsics.report"),
 }
 """Nothing comes of grey images that could be written; what may be written is told before."""
 _STREAMED = {"export.out, maps", "export.out, mcap", "show.out", "show.out, overlay", "show.out, rrd"}

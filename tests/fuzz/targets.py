@@ -18,7 +18,6 @@ from calib_core.interchange.formats.registry import FORMATS
 from calib_core.interchange.hypotheses.ranking import hypotheses_of
 from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
 from calib_core.interchange.importing import read_any
-from calib_core.interchange.own.board_views_json import read_board_views
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.interchange.own.pairs_files import read_pairs
@@ -240,7 +239,7 @@ def _unstated_files(_folder: Path) -> list[bytes]:
 
 def _own(data: bytes, _folder: Path) -> None:
     text = data.decode("utf-8", "surrogateescape")
-    for read in (read_clicks, read_pairs, read_calibration, read_camera, read_board_views, read_baseline):
+    for read in (read_clicks, read_pairs, read_calibration, read_camera, read_baseline):
         _swallow(lambda read=read: read(text, source="input"))
 
 
@@ -253,7 +252,6 @@ def _own_files(_folder: Path) -> list[bytes]:
         yaml.encode(),
         _PAIRS,
         _CLICKS,
-        _VIEWS,
         _BASELINE,
         _MERGED,
         b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n",
@@ -338,11 +336,6 @@ _BASELINE = json.dumps({
                 "information": [[float(i == j) for i in range(5)] for j in range(5)], "passages": [3], "seconds": 60.0},
 }).encode()  # fmt: skip
 _CLICKS = b'{"schema":"cocalib/clicks-1","clicks":[{"id":"c1","image_time":{"sec":1700000000,"nanosec":5},"pixel_px":[1.5,2]}]}'
-_VIEWS = (
-    b'{"schema":"cocalib/board-views-1","board":{"kind":"checkerboard","columns":9,"rows":6,"square_m":0.025},'
-    b'"source":{"name":"a","pictures":3,"sha256":"' + 64 * b"0" + b'"},"complete":false,"searched":[[0,1]],'
-    b'"views":[{"index":0,"name":"a1","size_px":[640,480],"corner_ids":[0,5],"pixels_px":[[1.5,2],[3,4]],"blur_px":1.0}]}'
-)
 _REQUESTS = (b"/?token=x\nHost: 127.0.0.1:8080", b"/ws/a\nHost: localhost\nUpgrade: websocket\nOrigin: http://x")
 _TYPED = (b"x=posX:m", b"forward,right,up,degrees", b"2024-05-01T12:00:00.25+02:00", b"img_1715938951.208764")
 _CSV = (

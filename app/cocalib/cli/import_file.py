@@ -11,7 +11,6 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import NO_ANSWER, exit_code
 from cocalib.cli.flags import File, OutFile, Output, OutputFlags, Require, Switch, called
-from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
 from cocalib.platform.files import write_whole
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.interchange.hypotheses.reading import UnstatedFile
     from calib_core.interchange.trees.reading import TreeFile
-    from calib_core.recordings import Recording
 
 
 _CONTRADICTED = 0.05
@@ -37,13 +35,6 @@ class MeaningFlags:
     """Which pose, if the file contains several: its sensor, or its place in the file, such as calibration.radar.T."""
     as_: Annotated[str | None, tyro.conf.arg(name="as", metavar="MEANING", help_behavior_hint="")] = None
     """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
-    sheet: OutFile = None
-    """Draw each meaning over a frame of --recording and write the image here (PNG)."""
-    recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
-    """A recording of these sensors, one file or several: --sheet draws over one of its frames."""
-    at: Annotated[float | None, called("SECONDS")] = None
-    """Which frame to draw over, in seconds after the first; by default the one in the middle."""
-    topics: Topics = field(default_factory=TopicFlags)
 
     def unstated(self, files: "Sequence[TreeFile] | None", source: str) -> "UnstatedFile | None":
         """Return the poses in a file that does not say what they mean; None if it does, or if this is a tree of frames.
@@ -71,14 +62,13 @@ class MeaningFlags:
         """
         from calib_core.interchange.hypotheses.composing import read_composed
 
-        asked = self.pose is not None or self.as_ is not None or self.sheet is not None
+        asked = self.pose is not None or self.as_ is not None
         return None if files is None or asked else read_composed(files, frames.wanted)
 
     def chosen(
         self,
         file: "UnstatedFile",
         *,
-        camera: "Camera | None" = None,
         pairs: "CheckPairs | None" = None,
         against: "ImportedCalibration | None" = None,
     ) -> "ImportedCalibration | None":
@@ -86,21 +76,18 @@ class MeaningFlags:
 
         Args:
             file: what was read.
-            camera: the intrinsics, to draw with.
             pairs: radar positions and the pixels where they were seen.
             against: a calibration of the same sensors that is known to be right.
 
         Raises:
             InputError: it contains no such pose or meaning; or the pairs contradict what was picked.
         """
-        from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of, likely_ones
+        from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of
         from calib_core.interchange.hypotheses.reading import as_imported, picked
 
         pose = file.pose_at(self.pose)
         other = None if against is None else against.camera_from_radar
         hypotheses = hypotheses_of(pose, pairs=pairs, against=other)
-        if self.sheet is not None:
-            self._write_sheet(self.sheet, file, likely_ones(hypotheses), camera)
         if self.as_ is not None:
             chosen = picked(hypotheses, self.as_, file.source)
             if pairs is not None or against is not None:
@@ -119,57 +106,9 @@ class MeaningFlags:
         Raises:
             InputError: one was given.
         """
-        given = (("--as", self.as_), ("--pose", self.pose), ("--sheet", self.sheet))
-        for flag, value in given:
+        for flag, value in (("--as", self.as_), ("--pose", self.pose)):
             if value is not None:
                 raise InputError(f"{source}: its format states what the numbers mean; omit {flag}")
-
-    def _write_sheet(
-        self, out: Path, file: "UnstatedFile", hypotheses: "Sequence[Hypothesis]", camera: "Camera | None"
-    ) -> None:
-        """Draw the hypotheses over a frame of the recording.
-
-        Raises:
-            CalibrationError: there is no recording or no camera, or they cannot be read.
-        """
-        from cocalib.hypothesis_sheet import contact_sheet, frame_with_returns, png
-        from cocalib.solving.solving import required_camera
-
-        if not self.recording:
-            raise InputError("--sheet draws over a frame of a recording; give it with --recording RECORDING")
-        with self.topics.open(self.recording, ("image", "radar")) as recording:
-            used = camera or _camera_in(file) or required_camera(recording, None)
-            frame = frame_with_returns(recording, used, _frame_at(recording, self.at))
-        write_whole(out, png(contact_sheet(frame, hypotheses)))
-        print(f"{out}: {len(hypotheses)} meanings drawn over a frame of {recording.name}", file=sys.stderr)
-
-
-def _camera_in(file: "UnstatedFile") -> "Camera | None":
-    """Return the camera in the file, if the size of its images is stated.
-
-    Raises:
-        InputError: a parameter is invalid.
-    """
-    camera = file.camera
-    return None if camera is None or camera.size_px is None else camera.camera(image_size_px=None, source=file.source)
-
-
-def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
-    """Return the index of the frame nearest to a time after the first; None if no time is given.
-
-    Raises:
-        InputError: the time is not in the recording.
-    """
-    import numpy as np
-
-    if seconds is None:
-        return None
-    after_s = (recording.image_times - recording.image_times[0]) / 1e9
-    if not 0 <= seconds <= after_s[-1] + 1:
-        raise InputError(
-            f"--at {seconds:g}: the frames of {recording.name} last {after_s[-1]:.1f} s; give a time in them"
-        )
-    return int(np.argmin(np.abs(after_s - seconds)))
 
 
 def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> None:
@@ -194,7 +133,7 @@ def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> 
         )
     print(
         f"Nothing was written: pick one, such as --as {shown[0].key}; or let them be tested with --pairs FILE or --against FILE. "
-        "--sheet FILE.png --recording RECORDING draws each over a frame."
+        "cocalib open RECORDING --calibration FILE draws each over its frames."
     )
 
 
@@ -268,7 +207,7 @@ class Import:
         elif unstated is None or files is None:
             found, sources = frames.read(self.calibration, files)
         else:
-            chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
+            chosen = self.meaning.chosen(unstated, pairs=pairs, against=against)
             if chosen is None:
                 return NO_ANSWER
             found, sources = chosen, (input_file(files[0]),)

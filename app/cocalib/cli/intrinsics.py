@@ -1,6 +1,5 @@
 """`cocalib intrinsics`: calibrate a lens from images of a board, or convert a file with intrinsics."""
 
-import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -14,18 +13,18 @@ from calib_core.input_files import name_text
 from calib_core.options import LensChoice
 from calib_core.recordings import RecordingOptions
 from calib_core.words.outcomes import said_of
-from cocalib.cli.flags import MORE, OutFile, OutFolder, Output, OutputFlags, Switch, called, same
-from cocalib.cli.output import explain_unsolvable
+from cocalib.cli.flags import MORE, OutFile, Output, OutputFlags, Switch, called, same
+from cocalib.cli.output import explain_unsolvable, progress_bar
 from cocalib.platform.files import write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
+    from calib_core.interchange.own.lens_documents import ImageSource
     from calib_core.intrinsics.board import Board
     from calib_core.intrinsics.calibrated_lens import CalibratedLens
-    from calib_core.intrinsics.coverage import BoardSearch, Coverage
+    from calib_core.intrinsics.coverage import BoardSearch
     from calib_core.results import DataWarning
     from cocalib.intrinsics import OpenImages
-    from cocalib.intrinsics.resumed_search import ResumedSearch
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +89,8 @@ class Intrinsics:
     """Format of the intrinsics: ros, kalibr, opencv, colmap, json."""
     rescale: Annotated[str | None, called("WIDTHxHEIGHT")] = None
     """With a file with intrinsics: convert them to the same images, resized to this size [px]."""
-    views: OutFile = None
-    """File of the views found (cocalib/board-views-1 JSON): read if it is there, to resume a search; written at the end."""
     report: OutFile = None
     """Write a report on the lens to this file (.html)."""
-    rectified: OutFolder = None
-    """Write the used images without the distortion into this folder, with straight lines to judge it by."""
     json: Switch = False
     """Print everything as JSON (cocalib/intrinsics-1)."""
     verbose: Switch = False
@@ -125,8 +120,7 @@ class Intrinsics:
     def _convert(self) -> int:
         from cocalib.cli.lens_output import convert_camera, require_format, size_of
 
-        unused = (self.views, self.report, self.rectified)
-        if any(unused) or self.json or self.board != BoardFlags() or self.image_topic:
+        if self.report or self.json or self.board != BoardFlags() or self.image_topic:
             raise InputError(
                 f"{self.source[0]} is a file with intrinsics, which is printed or converted (--to, --out), if any; for the other "
                 "options, give the recording, video or images of the board"
@@ -152,30 +146,29 @@ class Intrinsics:
             raise InputError(f"--to {self.to}: give the file to write with --out FILE")
 
     def _calibrate(self) -> int:
+        from calib_core.interchange.own.lens_documents import ImageSource
+        from calib_core.intrinsics.board_search import search_boards
         from calib_core.intrinsics.calibrating import calibrate_lens
         from calib_core.measurements import Unsolvable
-        from cocalib.cli.board_searching import kept_on_interruption, search_for, searched
         from cocalib.cli.lens_output import left_out_lines
         from cocalib.intrinsics import open_images
 
         board = self.board.required()
         with open_images(self.source, RecordingOptions(image_topic=self.image_topic)) as images:
-            search = search_for(images, board, _source_name(self.source), self.views)
-            with kept_on_interruption(search, self.views):
-                found = searched(search, self.views)
-                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.model)
-                if isinstance(lens, Unsolvable) or isinstance(found, Unsolvable):
-                    assert isinstance(lens, Unsolvable)
-                    code = explain_unsolvable(lens)
-                    lines = () if isinstance(found, Unsolvable) else left_out_lines(found.left_out)
-                    print("".join(f"  {line}\n" for line in lines), end="", file=sys.stderr)
-                    return code
-                lens = replace(lens, warnings=(*lens.warnings, *_series_warnings(images)))
-                return self._deliver(lens, found, search, images)
+            source = ImageSource(_source_name(self.source), len(images), images.digest())
+            with progress_bar("searching the board") as progress:
+                found = search_boards(images, board, progress=lambda now: progress(now.searched, now.total))
+            lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.model)
+            if isinstance(lens, Unsolvable) or isinstance(found, Unsolvable):
+                assert isinstance(lens, Unsolvable)
+                code = explain_unsolvable(lens)
+                lines = () if isinstance(found, Unsolvable) else left_out_lines(found.left_out)
+                print("".join(f"  {line}\n" for line in lines), end="", file=sys.stderr)
+                return code
+            lens = replace(lens, warnings=(*lens.warnings, *_series_warnings(images)))
+            return self._deliver(lens, found, source)
 
-    def _deliver(
-        self, lens: "CalibratedLens", found: "BoardSearch", search: "ResumedSearch", images: "OpenImages"
-    ) -> int:
+    def _deliver(self, lens: "CalibratedLens", found: "BoardSearch", source: "ImageSource") -> int:
         """Write and print the lens; return the exit code."""
         from calib_core.interchange.own.intrinsics_json import write_intrinsics
         from calib_core.intrinsics.coverage import view_coverage
@@ -187,7 +180,7 @@ class Intrinsics:
         if self.json:
             text = write_intrinsics(
                 lens,
-                search.source,
+                source,
                 searched=found.searched,
                 field_of_view_deg=field_of_view_deg(lens.camera),
                 coverage=coverage,
@@ -202,44 +195,18 @@ class Intrinsics:
             print(f"use it: cocalib open RECORDING --camera {self.out}", file=told)
         elif not self.json:
             print("use it: write it with --out camera.yaml, then cocalib open RECORDING --camera camera.yaml")
-        self._write_images(lens, found, coverage, images, search)
-        return 3 if any(warning.code in DOUBTFUL for warning in lens.warnings) else 0
-
-    def _write_images(
-        self,
-        lens: "CalibratedLens",
-        found: "BoardSearch",
-        coverage: "Coverage",
-        images: "OpenImages",
-        search: "ResumedSearch",
-    ) -> None:
-        """Write the report and the rectified images, if they are asked for."""
-        told = sys.stderr if self.json else sys.stdout
         if self.report is not None:
             from cocalib.report.lens_page import lens_report_html
 
-            write_whole(self.report, lens_report_html(lens, search.source, coverage, searched=found.searched))
+            write_whole(self.report, lens_report_html(lens, source, coverage, searched=found.searched))
             print(f"report written to {self.report}", file=told)
-        if self.rectified is not None:
-            from cocalib.intrinsics.rectified_images import rectified_images
-
-            self.rectified.mkdir(parents=True, exist_ok=True)
-            count = 0
-            for name, content in rectified_images(images, lens):
-                count += 1
-                write_whole(self.rectified / f"{count:03d}_{_file_name(name)}.png", content)
-            print(f"{count} rectified images written to {self.rectified}", file=told)
+        return 3 if any(warning.code in DOUBTFUL for warning in lens.warnings) else 0
 
 
 def _source_name(paths: tuple[Path, ...]) -> str:
     """Return what messages call the source."""
     names = [name_text(path.name or str(path)) for path in paths]
     return " + ".join(names) if len(names) < 3 else f"{names[0]} to {names[-1]}"
-
-
-def _file_name(name: str) -> str:
-    """Return an image's name as part of a file's name."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", Path(name).stem).strip("_") or "image"
 
 
 def _series_warnings(images: "OpenImages") -> "Iterator[DataWarning]":

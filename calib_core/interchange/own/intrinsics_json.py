@@ -1,10 +1,10 @@
 """Write intrinsics-1: a calibrated lens with all that is known about it, for programs."""
 
 import numpy as np
+from msgspec import structs
 
 from calib_core.arrays import Values
 from calib_core.camera import Camera
-from calib_core.interchange.own.board_views_json import published_left_out, published_source
 from calib_core.interchange.own.documents import camera_document, finite_or_none
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
@@ -25,6 +25,8 @@ from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_unc
 from calib_core.intrinsics.split_difference import split_difference
 from calib_core.words.intrinsics import halves_text, residuals_text
 from calib_core.words.outcomes import warning_text
+
+_LONGEST_NAME = 200
 
 
 def write_intrinsics(
@@ -48,7 +50,7 @@ def write_intrinsics(
         schema=INTRINSICS_SCHEMA,
         camera=camera_document(lens.camera),
         board=lens.board,
-        source=published_source(source),
+        source=structs.replace(source, name=source.name[:_LONGEST_NAME] or "images"),
         parameters=_parameters(lens.camera),
         field_of_view_deg=(finite_or_none(field_of_view_deg[0]), finite_or_none(field_of_view_deg[1])),
         rms_px=finite_or_none(lens.rms_px),
@@ -57,7 +59,7 @@ def write_intrinsics(
         models=_models(lens),
         searched=searched,
         views=[_view(view) for view in lens.views],
-        left_out=published_left_out(lens.left_out),
+        left_out=[structs.replace(image, name=image.name[:_LONGEST_NAME]) for image in lens.left_out],
         projection_uncertainty=_uncertainty(lens),
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),

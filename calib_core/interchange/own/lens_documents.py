@@ -1,4 +1,4 @@
-"""The keys of two more of our files: views of a board that a search has found, and a lens calibrated from such views."""
+"""The keys of one more of our files: a lens calibrated from views of a board."""
 
 from typing import Annotated, Final, Literal
 
@@ -8,10 +8,9 @@ from msgspec import Meta, Struct
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_images import LeftOutImage
-from calib_core.json_forms import Count, Measured, Name, Pixel
+from calib_core.json_forms import Count, Measured, Name
 from calib_core.words.outcomes import WarningText
 
-BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
 
 _Side = Annotated[int, Meta(ge=1, le=1_000_000)]
@@ -25,32 +24,6 @@ class ImageSource(Struct, frozen=True, forbid_unknown_fields=True):
     name: Name
     images: Count = msgspec.field(name="pictures")
     sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-
-
-class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The corners of the board in one image; (0, 0) is the center of the top-left pixel."""
-
-    index: _Number
-    name: Name
-    size_px: tuple[_Side, _Side]
-    corner_ids: Annotated[list[_Number], Meta(min_length=1, max_length=100_000)]
-    pixels_px: Annotated[list[Pixel], Meta(max_length=100_000)]
-    time_ns: Annotated[int, Meta(ge=-(2**62), le=2**62)] | None = None
-    blur_px: Annotated[float, Meta(ge=0.0, le=1e9)] | None = None
-
-
-class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What a search for a board has found so far; with it the search is resumed, or not done again.
-
-    searched are the first and the last number of runs of images that need not be looked at again.
-    """
-
-    schema: Literal["cocalib/board-views-1"]
-    board: Board
-    source: ImageSource
-    complete: bool
-    searched: list[tuple[_Number, _Number]]
-    views: list[BoardViewDocument]
 
 
 class LensParameterDocument(Struct, frozen=True):
@@ -147,5 +120,4 @@ class IntrinsicsDocument(Struct, frozen=True):
     board_shape_m: list[tuple[Measured, Measured, Measured]]
 
 
-for _document in (BoardViewsDocument, IntrinsicsDocument):
-    msgspec.json.Decoder(_document)  # for the reason given in documents.py
+msgspec.json.Decoder(IntrinsicsDocument)  # for the reason given in documents.py
