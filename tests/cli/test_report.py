@@ -8,12 +8,11 @@ def test_on_its_recording_the_report_has_held_out_errors_and_an_image_and_names_
     cocalib, solved_sample, bags, sample, tmp_path
 ):
     out = tmp_path / "report.html"
-    assert cocalib("evaluate", solved_sample, *bags, "--against", solved_sample, "--report", out).code == 0
+    assert cocalib("evaluate", solved_sample, *bags, "--report", out).code == 0
     html = out.read_text(encoding="utf-8")
     assert "in camera.bag + radar.bag" in html
     assert "data:image/jpeg;base64," in html
     assert 'class="return"' in html
-    assert "no difference" in html.lower()
     for folder in (solved_sample.parent, sample, tmp_path):
         assert str(folder) not in html
     assert len(html.encode()) < 3_000_000

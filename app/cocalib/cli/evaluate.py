@@ -13,7 +13,7 @@ import tyro
 from calib_core.errors import InputError
 from calib_core.words.outcomes import said_of
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, NO_ANSWER, Required, exit_code
-from cocalib.cli.flags import OUTPUT, File, Output, OutputFlags, Switch, called
+from cocalib.cli.flags import OUTPUT, Output, OutputFlags, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar, tell_choices
 from cocalib.platform.files import write_whole
@@ -44,8 +44,6 @@ class Evaluate:
     """A calibration in any format that import reads."""
     report: Annotated[tuple[Path, ...], called("FILE"), OUTPUT, tyro.conf.UseAppendAction] = ()
     """Write a report, .html, or .pdf (printed by Chrome, Chromium, Edge or Brave); may be repeated."""
-    against: File = None
-    """With --report: compare it with this other calibration of the same sensors."""
     require: Annotated[tuple[str, ...], called("LIMIT...")] = ()
     """Exit code 3 for a verdict below good or usable, or a stated 95 % error above max-deg=1 max-cm=10 max-px=15."""
     no_held_out: Switch = False
@@ -68,8 +66,6 @@ class Evaluate:
             return self._report()
         if not self.judging.recording:
             raise InputError("evaluate needs a recording, or --report FILE.html; see cocalib evaluate --help")
-        if self.against is not None:
-            raise InputError("--against is for the report; give --report FILE.html, or see cocalib check --against")
         return self._print_report(*self._evaluation(self.calibration))
 
     def _with_places(self) -> "Evaluate":
@@ -180,32 +176,27 @@ class Evaluate:
         return self._print_report(subject.found, subject.calibration, evaluation)
 
     def _subject(self) -> "ReportSubject":
-        from cocalib.report.making import against_of, known_calibration, subject_of
+        from cocalib.report.making import known_calibration, subject_of
 
         assert self.calibration is not None
         name = self.calibration.name
         found, inputs = self.judging.frames.read([self.calibration])
         camera = self.judging.read_camera()
-        other, others = self.judging.frames.read([self.against]) if self.against is not None else (None, ())
         if self.judging.recording:
-            subject, better = self._on_recording(found, other, camera)
+            subject = self._on_recording(found, camera)
         else:
-            subject, better = subject_of(found, known_calibration(found, name, camera=camera), name), ()
-        subject = replace(subject, inputs=inputs, required=self._limits())
-        if other is None or self.against is None:
-            return subject
-        lens = subject.calibration.camera if subject.calibration is not None else camera
-        return replace(subject, against=against_of(self.against.name, others, other, found, camera=lens, judged=better))
+            subject = subject_of(found, known_calibration(found, name, camera=camera), name)
+        return replace(subject, inputs=inputs, required=self._limits())
 
-    def _on_recording(
-        self, imported: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
-    ) -> "tuple[ReportSubject, tuple[str, ...]]":
-        """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
+    def _on_recording(self, imported: "ImportedCalibration", camera: "Camera | None") -> "ReportSubject":
+        """Return what is reported, with what the recording says of it by clicks and boxes, if there are any."""
         from cocalib.evaluation.recording_check import other_camera, require_size
         from cocalib.report.making import known_calibration, subject_of, watched
+        from cocalib.report.subject import RecordingEvidence
 
         assert self.calibration is not None
         name = self.calibration.name
+        options = self.judging.evidence.options()
         with self.judging.recorded.open(require=("radar",)) as recording:
             recorded = recording.camera()
             calibration = known_calibration(imported, name, camera=camera or recorded)
@@ -216,41 +207,10 @@ class Evaluate:
             seen = watched(recording, calibration, hashes, other_camera(imported, recorded))
             subject = replace(subject_of(imported, calibration, name), recording=seen)
             if calibration is None:
-                return subject, ()
-            return self._subject_of(subject, calibration, other, recording)
-
-    def _subject_of(
-        self,
-        subject: "ReportSubject",
-        calibration: "Calibration",
-        other: "ImportedCalibration | None",
-        recording: "Recording",
-    ) -> "tuple[ReportSubject, tuple[str, ...]]":
-        """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
-        from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
-        from cocalib.report.making import known_calibration
-        from cocalib.report.subject import RecordingEvidence
-
-        options = self.judging.evidence.options()
-        clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [subject.found])
-        boxes, labels = self.judging.evidence.boxes_in(recording)
-        if not clicks and boxes is None:
-            return subject, ()
-        evaluation = self._evaluate(calibration, recording, clicks, boxes, labels, options)
-        subject = replace(subject, judged=RecordingEvidence(evaluation, clicks))
-        if other is None or self.against is None:
-            return subject, ()
-        rival = known_calibration(other, self.against.name, camera=calibration.camera)
-        assert rival is not None  # a camera is given
-        names = self.against.name, subject.name
-        compared = compare_on_recording(
-            (rival, calibration),
-            recording,
-            names=names,
-            clicks=clicks,
-            boxes=boxes,
-            labels=labels,
-            options=options,
-        )
-        lines = comparison_lines(compared)
-        return subject, tuple(line for line in lines if not line.startswith("warning:"))
+                return subject
+            clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [imported])
+            boxes, labels = self.judging.evidence.boxes_in(recording)
+            if not clicks and boxes is None:
+                return subject
+            evaluation = self._evaluate(calibration, recording, clicks, boxes, labels, options)
+            return replace(subject, judged=RecordingEvidence(evaluation, clicks))

@@ -1,4 +1,4 @@
-"""From what was read to what is reported: the calibration with a camera, another one to compare with, and a recording's part."""
+"""From what was read to what is reported: the calibration with a camera, and a recording's part."""
 
 import hashlib
 from collections.abc import Sequence
@@ -9,7 +9,6 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.input_files import name_text
-from calib_core.interchange.check.agreement import compare
 from calib_core.interchange.check.slips import CheckResult
 from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.interchange.own.calibration_json import read_calibration
@@ -20,7 +19,7 @@ from cocalib.evaluation.recording_check import calibration_of
 from cocalib.platform.resources import version
 from cocalib.recorded_view import seen_in
 from cocalib.report.page import report_html
-from cocalib.report.subject import Against, Image, ReportSubject, Watched
+from cocalib.report.subject import Image, ReportSubject, Watched
 
 _WIDTH_PX = 640
 _QUALITY = 70
@@ -53,28 +52,6 @@ def known_calibration(found: ImportedCalibration, name: str, *, camera: Camera |
     if found.file is None and found.camera is None and camera is None:
         return None
     return calibration_of(found, name_text(name), camera)
-
-
-def against_of(
-    name: str,
-    inputs: tuple[InputFile, ...],
-    other: ImportedCalibration,
-    found: ImportedCalibration,
-    *,
-    camera: Camera | None = None,
-    judged: Sequence[str] = (),
-) -> Against:
-    """Compare with another calibration.
-
-    Args:
-        name: of the other's file.
-        inputs: the files that the other was read from.
-        other: what was read.
-        found: the calibration that is reported.
-        camera: the intrinsics, if neither has any.
-        judged: which one is better on the recording.
-    """
-    return Against(name_text(name), inputs, compare(other, found, camera=camera), tuple(judged))
 
 
 def watched(

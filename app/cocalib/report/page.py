@@ -9,7 +9,6 @@ from cocalib.report.sections.acc import acc
 from cocalib.report.sections.acceptance import acceptance, limits_met
 from cocalib.report.sections.answer import answer
 from cocalib.report.sections.cautions import cautions
-from cocalib.report.sections.comparison import comparison
 from cocalib.report.sections.coverage import coverage
 from cocalib.report.sections.pairs import pair_table
 from cocalib.report.sections.provenance import provenance
@@ -35,10 +34,7 @@ def report_html(subject: ReportSubject) -> str:
 
 def _sections(subject: ReportSubject) -> list[Child]:
     """Return the sections in their order; what nothing is known of is left out."""
-    shown: list[Child] = [answer(subject), cautions(subject)]
-    if subject.against is not None:
-        shown.append(comparison(subject.against))
-    shown.append(uncertainty(subject))
+    shown: list[Child] = [answer(subject), cautions(subject), uncertainty(subject)]
     if subject.calibration is not None:
         shown += _of_pairs(subject, subject.calibration)
     boxes = subject.judged.evaluation.boxes if subject.judged is not None else None

@@ -134,6 +134,6 @@ def drawing(alternative: str, *children: Child, width: float = 320.0, height: fl
     )
 
 
-def captioned(heading: str, drawn: Markup, words: str, *, class_: str | None = None) -> Markup:
-    """Return a drawing under its heading, with the sentence that says what to see."""
-    return tag("figure", tag("h3", heading), drawn, tag("figcaption", words), class_=class_)
+def captioned(heading: str, drawn: Markup, words: str = "") -> Markup:
+    """Return a drawing under its heading, with the sentence that says what to see, if there is one."""
+    return tag("figure", tag("h3", heading), drawn, tag("figcaption", words) if words else None)

@@ -1,10 +1,9 @@
-"""What a report is about, as values: a calibration, and what a recording and another calibration say of it."""
+"""What a report is about, as values: a calibration, and what a recording says of it."""
 
 from dataclasses import dataclass
 
 from calib_core.evaluation.figures import Evaluation
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.check.agreement import Comparison
 from calib_core.interchange.format import ImportedCalibration
 from calib_core.measurements import ReflectorClick
 from calib_core.results import Calibration, DataWarning, InputFile
@@ -57,23 +56,6 @@ class RecordingEvidence:
     clicks: tuple[ReflectorClick, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Against:
-    """Another calibration of the same sensors.
-
-    Attributes:
-        name: of its file.
-        inputs: its files, by their content.
-        comparison: the other one is the first of the two.
-        judged: which one is better on the recording, as sentences without their final periods.
-    """
-
-    name: str
-    inputs: tuple[InputFile, ...]
-    comparison: Comparison
-    judged: tuple[str, ...] = ()
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ReportSubject:
     """What a report is about.
@@ -86,7 +68,6 @@ class ReportSubject:
         inputs: the files that it was read from, by their content.
         recording: that it is judged on.
         judged: what the recording says of it.
-        against: another calibration.
         required: the reader's limits, such as "max-deg=1".
     """
 
@@ -97,7 +78,6 @@ class ReportSubject:
     inputs: tuple[InputFile, ...] = ()
     recording: Watched | None = None
     judged: RecordingEvidence | None = None
-    against: Against | None = None
     required: tuple[str, ...] = ()
 
     @property

@@ -59,7 +59,6 @@ def _files(subject: ReportSubject) -> list[tuple[str, InputFile]]:
             "judged on" if subject.judged is not None else "recording",
             subject.recording.inputs if subject.recording is not None else (),
         ),
-        ("compared with", subject.against.inputs if subject.against is not None else ()),
     )
     roles: dict[InputFile, list[str]] = {}
     for role, files in parts:

@@ -1,4 +1,4 @@
-"""Residual plots: vectors over the image, and lengths against range, azimuth, place and time; each with its sentence."""
+"""Residual plots: vectors over the image, and lengths against range, azimuth, place and time."""
 
 import numpy as np
 
@@ -6,14 +6,7 @@ from calib_core.arrays import Values
 from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, MarkKind, captioned, drawing, mark, rounded_step, text
-from cocalib.report.residual_rows import (
-    ResidualRows,
-    azimuth_sentence,
-    place_sentence,
-    range_sentence,
-    shift_sentence,
-    time_sentence,
-)
+from cocalib.report.residual_rows import ResidualRows
 from cocalib.report.sections.uncertainty import image_layer
 from cocalib.view.wording import plain
 
@@ -39,28 +32,22 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_ima
     centre = (np.array(size_px) - 1) / 2
     from_middle = np.linalg.norm(rows.pixels_px - centre, axis=1)
     every = max(1, int(np.ceil(rows.drawn.sum() / _MOST_DRAWN)))
-    notes = ["Length: distance from click to reprojection.", _judged_words(rows)]
+    notes = ["Length: distance from click to reprojection."]
     if every > 1:
         notes.append(f"One in {every} pairs is drawn.")
     plots: list[Child] = [
         _vectors(calibration, rows, every, with_image=with_image),
-        _scatter_plot(rows, rows.ranges_m, every, ("Length against range", "range [m]", range_sentence(rows))),
+        _scatter_plot(rows, rows.ranges_m, every, "Length against range", "range [m]"),
         _scatter_plot(
             rows,
             rows.azimuths_deg,
             every,
-            ("Length against azimuth", "azimuth [deg], left is positive", azimuth_sentence(rows)),
+            "Length against azimuth",
+            "azimuth [deg], left is positive",
             mirrored=True,
         ),
-        _scatter_plot(
-            rows,
-            from_middle,
-            every,
-            ("Length across the image", "distance from the middle [px]", place_sentence(rows, size_px)),
-        ),
-        _scatter_plot(
-            rows, rows.times_s, every, ("Length against time", "time since the first pair [s]", time_sentence(rows))
-        ),
+        _scatter_plot(rows, from_middle, every, "Length across the image", "distance from the middle [px]"),
+        _scatter_plot(rows, rows.times_s, every, "Length against time", "time since the first pair [s]"),
         _lengths(rows),
     ]
     return tag(
@@ -70,15 +57,6 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_ima
         tag("div", *plots, class_="three"),
         id="residuals",
     )
-
-
-def _judged_words(rows: ResidualRows) -> str:
-    """Say which pairs the sentences under the plots are about."""
-    if rows.used.sum() == rows.drawn.sum():
-        return "The sentences are about all pairs."
-    if rows.judged.sum() == rows.used.sum():
-        return "The sentences are about the pairs that agree."
-    return "Fewer than half of the pairs agree, so the sentences are about all of them."
 
 
 def legend() -> list[Child]:
@@ -115,33 +93,31 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_i
         dx, dy = (rows.residuals_px[index] * scale * factor).tolist()
         drawn += [tag("line", x1=x, y1=y, x2=x + dx, y2=y + dy, class_="vector"), mark(rows.kinds[index], x, y)]
     shown = tag("svg", *drawn, x=0.0, y=0.0, width=_WIDTH, height=height, class_="clip", aria_hidden="true")
-    words = shift_sentence(rows)
     image = drawing(
-        f"Residual vectors over the image, drawn {factor:g} times as long. {words}",
+        f"Residual vectors over the image, drawn {factor:g} times as long.",
         *image_layer(calibration, with_image=with_image),
         shown,
         width=_WIDTH,
         height=height,
     )
     times = "" if factor == 1.0 else f", {factor:g} times long"
-    return captioned(f"Click to reprojection{times}", image, words)
+    return captioned(f"Click to reprojection{times}", image)
 
 
 def _scatter_plot(
-    rows: ResidualRows, values: Values, every: int, words: tuple[str, str, str], *, mirrored: bool = False
+    rows: ResidualRows, values: Values, every: int, heading: str, label: str, *, mirrored: bool = False
 ) -> Markup:
-    heading, label, said = words
     shown = rows.drawn & np.isfinite(values)
     if not shown.any():
-        empty = drawing(f"{heading}: nothing to draw. {said}", text(_WIDTH / 2, 88, "nothing to draw", class_="middle"))
-        return captioned(heading, empty, said)
+        empty = drawing(f"{heading}: nothing to draw.", text(_WIDTH / 2, 88, "nothing to draw", class_="middle"))
+        return captioned(heading, empty)
     low, high = _ends(values[shown])
     axes = Axes(*((high, low) if mirrored else (low, high)), 0.0, 1.05 * max(float(rows.lengths_px[shown].max()), 1e-3))
     marks = [
         mark(rows.kinds[index], axes.x(values[index]), axes.y(rows.lengths_px[index]))
         for index in np.flatnonzero(shown)[::every].tolist()
     ]
-    return captioned(heading, drawing(f"{heading}. {said}", axes.drawn(label, "length [px]"), *marks), said)
+    return captioned(heading, drawing(f"{heading}.", axes.drawn(label, "length [px]"), *marks))
 
 
 def _ends(values: Values) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Residuals with a planted pattern, and calibrations to report."""
+"""Calibrations to report."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,61 +8,15 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.evaluation.figures import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
-from calib_core.interchange.check.agreement import compare
 from calib_core.interchange.format import imported
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.making import subject_of
-from cocalib.report.residual_rows import ResidualRows
-from cocalib.report.subject import Against, Image, RecordingEvidence, ReportSubject, Watched
+from cocalib.report.subject import Image, RecordingEvidence, ReportSubject, Watched
 
-SIZE_PX = (640, 480)
-_N = 60
 _UPRIGHT_PX = (480, 800)
 FILE = InputFile("radar.bag", 12, "5e" * 32)
-
-
-def planted_rows(*, growing_with: str = "", shift_px: float = 0.0, n: int = _N) -> ResidualRows:
-    """Return residuals of about 2 px in all directions, three times as long at the upper end of one quantity.
-
-    Args:
-        growing_with: "range", "azimuth" (to both sides), "left", "column", "middle" (away from it), "time"; "" for none.
-        shift_px: added to all of them, to the right.
-        n: number of pairs.
-    """
-    rng = np.random.default_rng(3)
-    ranges, azimuths = rng.uniform(3.0, 20.0, n), rng.uniform(-40.0, 40.0, n)
-    pixels = rng.uniform((0, 0), SIZE_PX, (n, 2))
-    times = rng.uniform(0.0, 100.0, n)
-    quantity = {
-        "range": ranges,
-        "azimuth": np.abs(azimuths),
-        "left": azimuths,
-        "column": pixels[:, 0],
-        "middle": np.linalg.norm(pixels - (np.array(SIZE_PX) - 1) / 2, axis=1),
-        "time": times,
-    }.get(growing_with, np.zeros(n))
-    share = (quantity - quantity.min()) / max(float(np.ptp(quantity)), 1e-9)
-    lengths = rng.uniform(1.0, 3.0, n) * (1.0 + 3.0 * share)
-    angles = rng.uniform(0.0, 2.0 * np.pi, n)
-    residuals = lengths[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1) + (shift_px, 0.0)
-    bearing = np.deg2rad(azimuths)
-    points = np.stack([ranges * np.cos(bearing), ranges * np.sin(bearing), np.zeros(n)], axis=1)
-    unknown = np.full(n, np.nan)
-    return ResidualRows(
-        tuple(f"c{index}" for index in range(n)),
-        ("used",) * n,
-        points,
-        pixels,
-        pixels + residuals,
-        times,
-        unknown,
-        unknown,
-        unknown,
-        unknown,
-        solved_from=True,
-    )
 
 
 def golden(project_root: Path) -> Calibration:
@@ -107,7 +61,7 @@ def box_figures() -> BoxFigures:
 
 
 def fullest_subject(project_root: Path) -> ReportSubject:
-    """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright image, another calibration."""
+    """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright image."""
     calibration, rng = golden(project_root), np.random.default_rng(2)
     width_px, height_px = _UPRIGHT_PX
     camera = Camera("pinhole", width_px, height_px, np.array([[500.0, 0, 240], [0, 500, 400], [0, 0, 1]]))
@@ -127,8 +81,5 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     jpeg = cv2.imencode(".jpg", np.full((height_px, width_px, 3), 200, np.uint8))[1].tobytes()
     image = Image(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
     seen = watched_recording(inputs=files, warnings=warnings, image=image)
-    moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
-    compared = compare(subject_for(project_root, moved).found, subject.found)
-    against = Against("other.json", (FILE,), compared, (long,) * 4)
     judged = RecordingEvidence(Evaluation(None, replace(box_figures(), rule=long)))
-    return replace(subject, recording=seen, judged=judged, against=against, inputs=(FILE,))
+    return replace(subject, recording=seen, judged=judged, inputs=(FILE,))

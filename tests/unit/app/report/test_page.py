@@ -12,16 +12,14 @@ from calib_core.errors import InputError
 from calib_core.evaluation.figures import Evaluation
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import AssumptionNote, Provenance, VehicleNote
-from calib_core.interchange.check.agreement import compare
 from calib_core.interchange.exporting import export
-from calib_core.interchange.format import imported
 from calib_core.interchange.importing import read_any
 from calib_core.results import DataWarning
 from calib_core.results.verdict import stated_error
 from cocalib.report.making import known_calibration, subject_of
 from cocalib.report.page import report_html
 from cocalib.report.sections.acceptance import limits_met
-from cocalib.report.subject import Against, RecordingEvidence, ReportSubject
+from cocalib.report.subject import RecordingEvidence, ReportSubject
 from cocalib.view.wording import plain
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
@@ -96,8 +94,7 @@ def test_text_of_a_recording_or_a_file_stays_text(project_root):
     subject = subject_for(project_root, replace(calibration, pairs=pairs, warnings=(warning,)))
     topics, inputs = (("radar", evil),), (replace(FILE, name=evil),)
     seen = watched_recording(name=evil, topics=topics, warnings=(warning,), inputs=inputs)
-    against = Against(evil, (), compare(subject.found, subject.found), (evil,))
-    subject = replace(subject, name=evil, recording=seen, against=against)
+    subject = replace(subject, name=evil, recording=seen)
     html = report_html(subject)
     assert "<img" not in html
     assert "&lt;img src=x onerror=alert(1)&gt;" in html
@@ -195,14 +192,6 @@ def test_many_pairs_are_cut_to_those_with_the_largest_residuals_and_few_or_none_
     lost = tuple(replace(one, projected_px=np.full(2, np.nan)) for one in calibration.pairs)
     words = _words(subject_for(project_root, replace(calibration, pairs=lost)))
     assert "There are no residuals" in words
-
-
-def test_a_comparison_shows_the_figures_of_check(subject, project_root):
-    calibration = golden(project_root)
-    moved = replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(np.full(6, 0.01)))
-    compared = compare(imported(subject_for(project_root, moved).found.file), subject.found)
-    words = _words(replace(subject, against=Against("other.json", (), compared)))
-    assert [figure for figure in compared.figures if f"{figure.label}{figure.text}" not in words] == []
 
 
 def test_limits_are_met_or_not_by_the_stated_error_and_there_is_room_to_sign(subject, project_root):
