@@ -28,7 +28,13 @@ def folder(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_from_a_folder_to_a_table(folder, cocalib):
     manifest = folder / "found.toml"
-    assert "3 sessions written to" in cocalib("batch", manifest, "--init", folder).out
+    rows = [(folder / "sessions.toml").read_text().replace('"1"', '"clicked"')]
+    for name, recording in (
+        ("not-clicked", ["van/not-clicked/radar.bag", "van/not-clicked/camera.bag"]),
+        ("broken", ["broken.bag"]),
+    ):
+        rows.append(f'[[session]]\nvehicle = "van"\nsession = "{name}"\nrecording = {recording}\n')
+    manifest.write_text("".join(rows))
     answer = cocalib("batch", manifest)
     assert answer.code == 12
     assert answer.out.splitlines()[0].endswith("1 refused, 1 failed")

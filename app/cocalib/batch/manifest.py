@@ -118,6 +118,8 @@ class ManifestDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 _MOST_BYTES = 64 * 1024 * 1024
 _TEXTS = ("vehicle", "session", "vehicle_type", "radar_serial", "camera_serial")
 
+_EXAMPLE = 'a [[session]] for each: vehicle = "V17", session = "1", recording = "drive.bag", clicks = "clicks.json"'
+
 
 def read_manifest(path: Path) -> Manifest:
     """Read a TOML manifest. Paths in it are relative to its folder; whether they exist is not looked at.
@@ -127,11 +129,11 @@ def read_manifest(path: Path) -> Manifest:
     """
     text = _text(path)
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{path}: a manifest is a .toml file; cocalib batch FILE.toml --init FOLDER writes one")
+        raise InputError(f"{path}: a manifest is a .toml file, with {_EXAMPLE}")
     places, content = _toml(text, path)
     document = checked(content, ManifestDocument, source=str(path))
     if not document.session:
-        raise InputError(f"{path}: no session in it; add one, or let cocalib batch {path} --init FOLDER write the file")
+        raise InputError(f"{path}: no session in it; add {_EXAMPLE}")
     defaults = content.get("defaults", {})
     sessions = [
         checked(_merged(defaults, one), SessionDocument, source=f"{path}: {place}")
@@ -144,12 +146,7 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def _text(path: Path) -> str:
-    return read_text(
-        path,
-        is_what="a manifest",
-        max_bytes=_MOST_BYTES,
-        if_missing=f"cocalib batch {path} --init FOLDER writes one",
-    )
+    return read_text(path, is_what="a manifest", max_bytes=_MOST_BYTES, if_missing=f"write one, with {_EXAMPLE}")
 
 
 def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:

@@ -10,7 +10,7 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, batch_exit_code
-from cocalib.cli.flags import INPUT, Folder, OutFile, OutFolder, Output, OutputFlags, Require, Switch, called
+from cocalib.cli.flags import INPUT, OutFile, OutFolder, Output, OutputFlags, Require, Switch, called
 from cocalib.cli.output import progress_bar
 from cocalib.platform.files import require_writable, write_whole
 from cocalib.platform.terminal import print_exactly
@@ -32,8 +32,6 @@ class Batch:
     """Sessions to calibrate (.toml); or status and the folder that batch wrote to."""
     out: OutFolder = None
     """Folder for the results; beside the manifest, with its name, unless given."""
-    init: Folder = None
-    """Write the manifest from the recordings in this folder, for you to complete, and calibrate nothing."""
     workers: Annotated[int | None, called("N")] = None
     """Worker processes on this machine; 1: this process does the work; one per processor for many sessions, unless given."""
     require: Require = None
@@ -55,27 +53,9 @@ class Batch:
             return self._status(others)
         if others or self.json or self.csv is not None:
             raise InputError("batch takes one MANIFEST, or status OUT; see cocalib batch --help")
-        manifest = Path(first)
-        if self.init is not None:
-            return self._write_first(manifest, self.init)
         from cocalib.batch.manifest import read_manifest
 
-        return self._calibrate(read_manifest(manifest))
-
-    def _write_first(self, manifest: Path, folder: Path) -> int:
-        """Write a first manifest, never over another file."""
-        from cocalib.batch.first_manifest import first_manifest
-
-        if manifest.suffix.lower() != ".toml":
-            raise InputError(f"{manifest}: --init writes a .toml file; name it so")
-        if manifest.exists():
-            raise InputError(f"{manifest}: exists already; name another file, or move it away")
-        text, count = first_manifest(folder, manifest)
-        write_whole(manifest, text)
-        print(
-            f"{count} session{'' if count == 1 else 's'} written to {manifest}: complete it, then cocalib batch {manifest}"
-        )
-        return 0
+        return self._calibrate(read_manifest(Path(first)))
 
     def _status(self, folders: Sequence[str]) -> int:
         """Show the results of a folder; return 0 if all sessions are solved and none is in doubt."""

@@ -73,7 +73,7 @@ def test_an_absolute_path_stays_as_it_is(tmp_path):
         ('[sessions]\nvehicle = "a"', "sessions: unknown key; did you mean session?"),
         ("session = 3", "session: expected array, got int"),
         ("[defaults]\nauto = 3", "defaults.auto: expected bool, got int"),
-        ("", "no session in it; add one, or let cocalib batch"),
+        ("", "no session in it; add a [[session]]"),
         ("[[session", "not valid TOML: "),
         (ROW.replace('"a"', '"a/b"'), "session 1 (a/b): vehicle: 'a/b' cannot be a name"),
         (ROW.replace("b.bag", ".."), "session 1 (a): session: '..' cannot be a name"),
@@ -114,10 +114,8 @@ def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
     for name in ("sessions.yaml", "sessions.csv"):
-        assert "cocalib batch FILE.toml --init" in fault_of("a: 1", tmp_path, name)
-    with pytest.raises(
-        InputError, match=r"no such file or folder; cocalib batch .*absent\.toml --init FOLDER writes one"
-    ):
+        assert "[[session]]" in fault_of("a: 1", tmp_path, name)
+    with pytest.raises(InputError, match=r"no such file or folder; .*\[\[session\]\]"):
         read_manifest(tmp_path / "absent.toml")
     for data, words in ((b"\xff\xfe\x00", "not a text file"), (ROW.encode() + b"# K\xe4fer", "save it as UTF-8")):
         (tmp_path / "binary.toml").write_bytes(data)
