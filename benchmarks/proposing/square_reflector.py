@@ -24,7 +24,7 @@ _CARRIED_M = 0.35
 
 def with_square_reflectors(recording: SimulatedRecording) -> SimulatedRecording:
     """Return a recording whose images show reflectors of squares."""
-    return _Recording(recording.stage, recording.placements, recording.clicked)
+    return _Recording(recording.stage, recording.placements, recording.clicks)
 
 
 class _Renderer(FrameRenderer):

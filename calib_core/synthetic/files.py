@@ -34,7 +34,7 @@ from calib_core.recordings.containers.writing import (
     write_ros2,
 )
 from calib_core.synthetic.annotations import is_annotated, true_boxes, true_labels
-from calib_core.synthetic.options import Clicking, Container, RadarDefects
+from calib_core.synthetic.options import Container, RadarDefects
 from calib_core.synthetic.radar_returns import Antenna, second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.scans import side_scans
@@ -185,16 +185,12 @@ def truth_text(recording: SimulatedRecording) -> str:
         ],
     }
     defects = options.defects
-    if defects.azimuth_bias_deg or defects.elevation_bias_deg or defects.z_offset_m:
+    if defects.azimuth_bias_deg or defects.elevation_bias_deg:
         document["camera_from_reported"] = _transform(stage.camera_from_reported)
     if stage.waving is not None:
         board, when = stage.waving.board, _span(*stage.recorded_span(0.0, options.waved_board_s))
         size = {"columns": board.columns, "rows": board.rows, "square_m": board.square_m}
         document["board"] = {"kind": board.kind, **size, **when}
-    if options.clicking != Clicking():
-        document["clicks"] = [
-            {"id": one.click.id, "placement": one.placement_id, "faults": list(one.faults)} for one in recording.clicked
-        ]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 

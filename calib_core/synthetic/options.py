@@ -11,7 +11,7 @@ from calib_core.options import option
 from calib_core.synthetic.rig import RigOptions
 
 RadarName = Literal["awr1843", "imaging"]
-ReportedElevation = Literal["measured", "zero", "rounding"]
+ReportedElevation = Literal["measured", "zero"]
 SecondAzimuth = Literal["none", "column", "topic"]
 
 
@@ -21,19 +21,11 @@ class RadarDefects:
 
     azimuth_scale: float = option(1.0, "Reported azimuth over the true one.", low=0.5, high=2.0)
     elevation_scale: float = option(1.0, "Reported elevation over the true one.", low=0.5, high=2.0)
-    scaled: Literal["angle", "sine"] = option(
-        "angle", "What the two scales multiply: the angle, or its sine, as a wrong spacing or wavelength does."
-    )
     azimuth_bias_deg: float = option(0.0, "Constant azimuth error [deg].", low=-45.0, high=45.0)
     elevation_bias_deg: float = option(0.0, "Constant elevation error [deg].", low=-45.0, high=45.0)
     range_bias_m: float = option(0.0, "Constant range error [m].", low=-2.0, high=2.0)
     range_scale: float = option(1.0, "Reported range over the true one.", low=0.5, high=2.0)
-    elevation: ReportedElevation = option(
-        "measured", "Elevations: as measured, all zero as from a 2D radar, or a rounding error of 1e-6 rad."
-    )
-    z_offset_m: float = option(
-        0.0, "What the driver adds to z, such as the height of the mount [m].", low=-10.0, high=10.0
-    )
+    elevation: ReportedElevation = option("measured", "Elevations: as measured, or all zero as from a 2D radar.")
     mirrored: bool = option(False, "Have the driver report y to the right, which mirrors the scene.")
     length_unit_m: float = option(
         1.0, "Unit of the lengths that the driver reports, such as 0.001 for millimetres [m].", low=1e-4, high=10.0
@@ -75,7 +67,6 @@ class RadarDefects:
     near_and_far: bool = option(
         False, "Publish near scans (25 Hz, up to 10 m) and far scans (20 Hz, from 5 m) as clouds in two topics."
     )
-    in_turn: bool = option(False, "Publish near and far scans in turn, 13 times a second each.")
     second_azimuth: SecondAzimuth = option(
         "none", "Publish a second azimuth of each return: not, or in a column or a topic of its own; as clouds."
     )
@@ -155,19 +146,6 @@ class IntrinsicsErrors:
 
 
 @dataclass(frozen=True, slots=True)
-class Clicking:
-    """How the example clicks are made."""
-
-    clicks_per_placement: int = option(1, "Clicks of each placement, in different frames.", low=1, high=9)
-    low_px: float = option(0.0, "How far below the right pixel every click is [px].", low=-500.0, high=500.0)
-    low_m: float = option(0.0, "How far below the apex every click is, on the reflector [m].", low=-1.0, high=1.0)
-    late_share: float = option(
-        0.0, "Share of the clicks that are made one dwell late, when the reflector has moved on.", low=0.0, high=1.0
-    )
-    hasty_first_px: float = option(0.0, "Error of the first click, in any direction [px].", low=0.0, high=500.0)
-
-
-@dataclass(frozen=True, slots=True)
 class SimulationOptions:
     """What to simulate; the same options give the same bytes."""
 
@@ -226,7 +204,6 @@ class SimulationOptions:
     intrinsics: IntrinsicsErrors = option(
         IntrinsicsErrors(), "How the published intrinsics differ from those of the images."
     )
-    clicking: Clicking = option(Clicking(), "How the example clicks are made.")
     traffic: Traffic = option(Traffic(), "Who moves in front of the sensors to be judged.")
     waved_board_s: float = option(
         0.0,

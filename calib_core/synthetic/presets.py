@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from calib_core.synthetic.options import (
-    Clicking,
     IntrinsicsErrors,
     RadarDefects,
     SimulationOptions,
@@ -25,8 +24,6 @@ _CAR_PARK = Surroundings(parked_cars=3, fence=True, strong_target_dbsm=29.0)
 PRESETS: Mapping[str, SimulationOptions] = {
     "default": SimulationOptions(),
     "angle-scale": SimulationOptions(defects=RadarDefects(azimuth_scale=1.03)),
-    "sine-scale": SimulationOptions(defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, scaled="sine")),
-    "range-bias": SimulationOptions(radar="imaging", defects=RadarDefects(range_bias_m=0.12, range_scale=1.003)),
     "biased-radar": SimulationOptions(
         defects=RadarDefects(
             azimuth_scale=0.98,
@@ -36,16 +33,9 @@ PRESETS: Mapping[str, SimulationOptions] = {
             range_bias_m=-0.05,
         )
     ),
-    "mount-height": SimulationOptions(defects=RadarDefects(z_offset_m=0.5)),
     "mirrored-radar": SimulationOptions(defects=RadarDefects(mirrored=True)),
     "millimetres": SimulationOptions(defects=RadarDefects(length_unit_m=0.001)),
     "flat": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero")),
-    "flat-height": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero", z_offset_m=0.5)),
-    "flat-rounding": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="rounding")),
-    "flat-tilted": SimulationOptions(
-        rig=RigOptions(radar_height_m=1.2, radar_tilt_deg=10.0, radar_roll_deg=3.0),
-        defects=RadarDefects(elevation="zero"),
-    ),
     "coarse": SimulationOptions(
         defects=RadarDefects(
             range_bin_m=0.15,
@@ -59,7 +49,6 @@ PRESETS: Mapping[str, SimulationOptions] = {
         radar="imaging", defects=RadarDefects(range_bin_m=0.01, azimuth_bins=512, elevation_bins=256)
     ),
     "near-far": SimulationOptions(radar="imaging", defects=RadarDefects(near_and_far=True)),
-    "second-azimuth": SimulationOptions(radar="imaging", defects=RadarDefects(second_azimuth="topic")),
     "near-far-azimuths": SimulationOptions(
         radar="imaging", defects=RadarDefects(near_and_far=True, second_azimuth="topic")
     ),
@@ -86,39 +75,19 @@ PRESETS: Mapping[str, SimulationOptions] = {
     ),
     "passers-by": SimulationOptions(surroundings=Surroundings(passers_by=6)),
     "islands": SimulationOptions(dwell_s=10.0, islands=True),
-    "two-reflectors-islands": SimulationOptions(
-        scene="field", dwell_s=10.0, reflectors=2, islands=True, surroundings=Surroundings(parked_cars=2)
-    ),
     "two-reflectors-close": SimulationOptions(reflectors=2, reflectors_apart_m=0.7),
     "two-reflectors-azimuths": SimulationOptions(
         radar="imaging", reflectors=2, reflectors_apart_m=0.7, defects=RadarDefects(second_azimuth="column")
     ),
-    "two-reflectors-topics": SimulationOptions(
-        radar="imaging",
-        scene="field",
-        reflectors=2,
-        reflectors_apart_m=0.7,
-        surroundings=_CAR_PARK,
-        defects=RadarDefects(near_and_far=True, in_turn=True, second_azimuth="column"),
-    ),
     "focal-length": SimulationOptions(intrinsics=IntrinsicsErrors(focal_length_scale=1.02)),
     "principal-point": SimulationOptions(intrinsics=IntrinsicsErrors(principal_point_px=(30.0, 0.0))),
-    "double-clicks": SimulationOptions(clicking=Clicking(clicks_per_placement=3)),
-    "low-clicks": SimulationOptions(clicking=Clicking(low_px=6.0)),
-    "mouth-clicks": SimulationOptions(clicking=Clicking(low_m=0.1)),
-    "late-clicks": SimulationOptions(clicking=Clicking(late_share=0.2)),
-    "careless-clicks": SimulationOptions(
-        click_sigma_px=2.0,
-        clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
-    ),
     "unkind": SimulationOptions(
         scene="field",
         reflectors=2,
         islands=True,
         click_sigma_px=2.0,
-        defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, scaled="sine", range_bias_m=0.05),
+        defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, range_bias_m=0.05),
         surroundings=Surroundings(parked_cars=2, strong_target_dbsm=29.0, passers_by=4),
-        clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
     ),
     "paper-d1": SimulationOptions(
         scene="open-rooftop", person_leaves=True, camera_rate_hz=1.0, defects=_PAPER_RADAR, surroundings=_BARE

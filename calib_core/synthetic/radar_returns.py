@@ -133,7 +133,6 @@ def _sine(angle_deg: float | None) -> float | None:
 
 _NEAR_HZ, _NEAR_END_M = 25.0, 10.0
 _FAR_HZ, _FAR_BEGIN_M = 20.0, 5.0
-_IN_TURN_HZ, _IN_TURN_END_M, _FIRST_S = 13.0, 30.0, 0.05
 _NEAR_BEAM_DEG, _FAR_BEAM_DEG = 60.0, 20.0
 _NEAR_GAIN_DB, _FAR_GAIN_DB = -4.0, 8.0
 _NEAR_COARSER = 2.0
@@ -176,10 +175,8 @@ def antennas_of(
         segments: what of it is recorded.
     """
 
-    def times(rng: np.random.Generator, rate_hz: float, first_s: float | None = None) -> SensorTimes:
-        return draw_times(
-            rng, duration_s, rate_hz, latency_s=profile.latency_s, transfer_s=0.003, segments=segments, first_s=first_s
-        )
+    def times(rng: np.random.Generator, rate_hz: float) -> SensorTimes:
+        return draw_times(rng, duration_s, rate_hz, latency_s=profile.latency_s, transfer_s=0.003, segments=segments)
 
     if not options.defects.near_and_far:
         return (Antenna("", profile, times(rngs[0], options.radar_rate_hz)),)
@@ -191,14 +188,9 @@ def antennas_of(
         resolution_azimuth=_NEAR_COARSER * profile.resolution_azimuth,
     )
     far = replace(profile, beam_azimuth_deg=_FAR_BEAM_DEG, snr_at_10_m_db=profile.snr_at_10_m_db + _FAR_GAIN_DB)
-    if options.defects.in_turn:
-        far_times, near_end_m = times(rngs[0], _IN_TURN_HZ, _FIRST_S), _IN_TURN_END_M
-        near_times = times(rngs[1], _IN_TURN_HZ, _FIRST_S + 0.5 / _IN_TURN_HZ)
-    else:
-        far_times, near_times, near_end_m = times(rngs[0], _FAR_HZ), times(rngs[1], _NEAR_HZ), _NEAR_END_M
     return (
-        Antenna("far", far, far_times, min_range_m=_FAR_BEGIN_M),
-        Antenna("near", near, near_times, max_range_m=near_end_m),
+        Antenna("far", far, times(rngs[0], _FAR_HZ), min_range_m=_FAR_BEGIN_M),
+        Antenna("near", near, times(rngs[1], _NEAR_HZ), max_range_m=_NEAR_END_M),
     )
 
 
@@ -290,7 +282,7 @@ def measure(
     cosines, velocity = _on_bins(distorted(echoes.cosines, defects), echoes.velocity_mps, profile)
     kept = _resolved(cosines, velocity, echoes.snr_db, profile)
     kept = kept[np.argsort(cosines[kept, 0], kind="stable")]
-    points = reported_points(rng, cosines[kept], defects).astype(np.float32).astype(np.float64)
+    points = reported_points(cosines[kept], defects).astype(np.float32).astype(np.float64)
     n = len(points)
     scan = RadarScan(
         time,
@@ -396,7 +388,6 @@ def _resolved(cosines: Points3, velocity: Values, snr: Values, profile: RadarPro
     return np.array(kept, dtype=np.int64)
 
 
-_ROUNDING_RAD = 1e-6
 _PERIOD = 0.6
 """Distance of the two azimuths in sine: antennas 1.7 wavelengths apart cannot tell them apart."""
 
@@ -411,45 +402,35 @@ def distorted(cosines: Points3, defects: RadarDefects) -> Points3:
     r, u, w = cosines.T
     elevation = np.arcsin(np.clip(w, -1.0, 1.0))
     azimuth = np.arctan2(u, np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w)))
-    azimuth = _scaled(azimuth, defects.azimuth_scale, defects) + np.deg2rad(defects.azimuth_bias_deg)
-    elevation = _scaled(elevation, defects.elevation_scale, defects) + np.deg2rad(defects.elevation_bias_deg)
+    azimuth = azimuth * defects.azimuth_scale + np.deg2rad(defects.azimuth_bias_deg)
+    elevation = elevation * defects.elevation_scale + np.deg2rad(defects.elevation_bias_deg)
     range_m = r * defects.range_scale + defects.range_bias_m
     return np.stack([range_m, np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=1)
 
 
-def _scaled(angle_rad: Values, scale: float, defects: RadarDefects) -> Values:
-    if defects.scaled == "angle":
-        return angle_rad * scale
-    return np.arcsin(np.clip(np.sin(angle_rad) * scale, -1.0, 1.0))
-
-
-def reported_points(rng: np.random.Generator, cosines: Points3, defects: RadarDefects) -> Points3:
-    """Convert to x, y, z as the driver does: with its axes, its unit and its origin of z, and perhaps without elevation.
+def reported_points(cosines: Points3, defects: RadarDefects) -> Points3:
+    """Convert to x, y, z as the driver does: with its axes and its unit, and perhaps without elevation.
 
     Args:
-        rng: used for the rounding error only.
         cosines: (n, 3) the measured ones.
         defects: what the driver does.
     """
     r, u, w = cosines.T
-    if defects.elevation != "measured":
-        flat = defects.elevation == "zero"
-        w = np.zeros(len(w)) if flat else _ROUNDING_RAD * rng.uniform(-1.0, 1.0, len(w))
+    if defects.elevation == "zero":
+        w = np.zeros(len(w))
     x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
-    z = r * w + defects.z_offset_m if defects.z_offset_m else r * w
-    points = np.stack([x, -r * u if defects.mirrored else r * u, z], axis=1)
+    points = np.stack([x, -r * u if defects.mirrored else r * u, r * w], axis=1)
     return points if defects.length_unit_m == 1.0 else points / defects.length_unit_m
 
 
 def radar_from_reported(defects: RadarDefects) -> RigidTransform:
-    """Return the radar's frame from the frame in which it reports: a bias of the angles turns it, an offset of z moves it.
+    """Return the radar's frame from the frame in which it reports: a bias of the angles turns it.
 
-    The azimuth's bias and the offset of z are exactly such a motion, the elevation's bias only straight ahead.
+    The azimuth's bias is exactly such a turn, the elevation's bias only straight ahead.
     """
     turn = rotation_exp(np.array([0.0, 0.0, -np.deg2rad(defects.azimuth_bias_deg)]))
     nod = rotation_exp(np.array([0.0, np.deg2rad(defects.elevation_bias_deg), 0.0]))
-    rotation = nod @ turn
-    return RigidTransform(rotation, -rotation @ np.array([0.0, 0.0, defects.z_offset_m]))
+    return RigidTransform(nod @ turn, np.zeros(3))
 
 
 def second_azimuths(points_radar_m: Points3) -> Points3:

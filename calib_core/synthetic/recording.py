@@ -10,7 +10,6 @@ from calib_core.arrays import Points2, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, RadarScans, ReflectorClick, TimeNs
-from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.radar_returns import Antenna
 from calib_core.synthetic.rendering.frames import FrameRenderer
@@ -50,19 +49,14 @@ class SimulatedRecording:
     Attributes:
         stage: everything decided before the sensors measure.
         placements: the truth about each placement, in order of time.
-        clicked: the example clicks with their truth; by default one per placement, with click noise.
+        clicks: the example clicks, one for each placement in their order, with click noise; ids "c1", "c2", ...
         first: of a second camera, the same recording through the first one, which has the same scans.
     """
 
     stage: Stage
     placements: tuple[SimulatedPlacement, ...]
-    clicked: tuple[SimulatedClick, ...]
+    clicks: tuple[ReflectorClick, ...]
     first: "SimulatedRecording | None" = None
-
-    @property
-    def clicks(self) -> tuple[ReflectorClick, ...]:
-        """The example clicks; ids "c1", "c2", ..."""
-        return tuple(one.click for one in self.clicked)
 
     @property
     def options(self) -> SimulationOptions:
@@ -153,4 +147,14 @@ def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
 
 def _recorded(stage: Stage, first: SimulatedRecording | None = None) -> SimulatedRecording:
     placements = placements_of(stage)
-    return SimulatedRecording(stage, placements, clicks_of(stage, placements), first)
+    return SimulatedRecording(stage, placements, _clicks(stage, placements), first)
+
+
+def _clicks(stage: Stage, placements: tuple[SimulatedPlacement, ...]) -> tuple[ReflectorClick, ...]:
+    """Click each placement in its best frame, with click noise."""
+    noise_px = stage.options.click_sigma_px * child_rng(stage.options, 8).standard_normal((len(placements), 2))
+    clicks = []
+    for number, (placement, error_px) in enumerate(zip(placements, noise_px, strict=True), 1):
+        u_px, v_px = (placement.pixel_px + error_px).tolist()
+        clicks.append(ReflectorClick(placement.best_image_time, f"c{number}", round(u_px, 2), round(v_px, 2)))
+    return tuple(clicks)

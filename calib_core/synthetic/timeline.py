@@ -104,7 +104,6 @@ def draw_times(
     latency_s: float,
     transfer_s: float,
     segments: RecordedSegments = EVERYTHING,
-    first_s: float | None = None,
 ) -> SensorTimes:
     """Draw one sensor's times.
 
@@ -115,10 +114,8 @@ def draw_times(
         latency_s: from the measurement to its stamp [s].
         transfer_s: mean delay from the stamp to the recorder [s].
         segments: what of the story is recorded.
-        first_s: time of the first measurement [s]; None draws it.
     """
-    drawn_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)
-    moments = np.arange(drawn_s if first_s is None else first_s, duration_s, 1.0 / rate_hz)
+    moments = np.arange(rng.uniform(0.05, 0.05 + 1.0 / rate_hz), duration_s, 1.0 / rate_hz)
     jitter = np.clip(_JITTER_S * rng.standard_normal(len(moments)), -0.3 / rate_hz, 0.3 / rate_hz)
     moments = (moments + jitter)[rng.uniform(size=len(moments)) >= _DROPPED_SHARE]
     moments = moments[segments.recorded(moments)]

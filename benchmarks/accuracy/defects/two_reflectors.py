@@ -35,9 +35,9 @@ def measure_returns(preset: PresetName, trial: int) -> Figures:
     outcome = calibrate(simulated.clicks, scans, simulated.camera)
     if not isinstance(outcome, Calibration):
         return {"clicks": float(len(simulated.clicks)), "wrong": None, "wrong_agreeing": None, "asked": None}
-    placement_of = {one.click.id: one.placement_id for one in simulated.clicked}
-    truth = {placement.id: placement.position_radar_m for placement in simulated.placements}
-    wrong = [pair for pair in outcome.pairs if not _same(pair.point_radar_m, truth[placement_of[pair.id]])]
+    placed = zip(simulated.clicks, simulated.placements, strict=True)
+    truth = {click.id: placement.position_radar_m for click, placement in placed}
+    wrong = [pair for pair in outcome.pairs if not _same(pair.point_radar_m, truth[pair.id])]
     return {
         "clicks": float(len(simulated.clicks)),
         "wrong": float(len(wrong) + len(outcome.unpaired)),
