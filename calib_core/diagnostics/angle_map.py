@@ -4,7 +4,7 @@ An array's calibration error changes slowly with direction, is stable for years,
 transform. The residuals of a calibration show it: the direction of the click minus the direction measured by the radar, at
 the radar's range. Each of the two angles is modeled as a Gaussian process over direction,
 
-    y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (7)
+    y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),
 
 and every (a, l, s) of a grid is weighted by its marginal likelihood; the grid includes a = 0, so that the map is flat where
 the pairs show nothing but independent noise. The map belongs to positions with `radar_errors` taken out, which the estimate
@@ -28,10 +28,10 @@ _LEAST_PAIRS = 8
 _MOST_PAIRS = 120
 """Beyond this many the pairs are thinned out, because neighbors are redundant."""
 
-# l of (7) in ratios of about sqrt(2): an array's errors change over a part of its field of view (a choice)
+# l in ratios of about sqrt(2): an array's errors change over a part of its field of view (a choice)
 _LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
-_SMOOTH_RAD = np.deg2rad([0.0, *0.2 * 2.0 ** np.arange(5)])  # a of (7): none, and in factors of 2 (a choice)
-_INDEPENDENT_RAD = np.deg2rad(0.05 * 2.0 ** np.arange(6))  # s of (7) in factors of 2 (a choice)
+_SMOOTH_RAD = np.deg2rad([0.0, *0.2 * 2.0 ** np.arange(5)])  # a: none, and in factors of 2 (a choice)
+_INDEPENDENT_RAD = np.deg2rad(0.05 * 2.0 ** np.arange(6))  # s in factors of 2 (a choice)
 _IMPROBABLE = 1e-3  # share of the likeliest model's weight, below which one is left out to save time
 _STEP_RAD, _BEYOND_RAD = _LENGTHS_RAD[0] / 2, _LENGTHS_RAD[0]  # the map's lines and its margin, by the shortest length
 _ONE_PX = np.array([1.0, 0.0])
@@ -143,7 +143,7 @@ class _Field:
 
 
 def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points2) -> _Field:
-    """Regress one angle's error on direction by equation (7), with the same click noise for all pairs.
+    """Regress one angle's error on direction, with the same click noise for all pairs.
 
     All covariances of one length then share the kernel's eigenvectors U: K = U diag(k) U^T, V = U diag(a^2 k + s^2) U^T.
     """

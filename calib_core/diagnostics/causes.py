@@ -5,7 +5,7 @@ placements (constant, the range, the azimuth, its square, ...), an error of the 
 With whitened residuals e, whitened Jacobians J of the pose and of the estimated errors, priors included, and
 M = I - J (J^T J)^-1 J^T, which removes what these can explain,
 
-    a = g^T M e / g^T M g,    var a = (s + sum_w (g^T M B_w)^2 / g^T M g) / g^T M g,                  (8)
+    a = g^T M e / g^T M g,    var a = (s + sum_w (g^T M B_w)^2 / g^T M g) / g^T M g,
 
 with s the noise that is left, because it was estimated from residuals that the cause had made larger, and B_w what else is
 uncertain: the errors that only widen the covariance, with their priors, and smooth angle errors (`covariance`). So what is within
@@ -200,7 +200,7 @@ class _Null:
         )
 
     def test(self, cause: Cause, smooth_variance: float) -> Tested | None:
-        """Evaluate equation (8); None if pose and estimated errors leave nothing of the cause."""
+        """Estimate a cause; None if pose and estimated errors leave nothing of the cause."""
         count = len(self.root)
         gain = np.zeros((len(self.residual), cause.columns.shape[2]))
         gain[: 2 * count] = (cause.columns * self.root[:, None, None]).reshape(2 * count, -1)

@@ -8,7 +8,8 @@ relative to the click, an offset s of the radar's stamps satisfies a_i <= s <= b
 
 Clocks that differ by a dwell or more give each click the return of another placement. Where placements follow a pattern, such
 as the rows of a grid, that is a shift which most pairs agree on; only the ends of the rows do not. So where pairs disagree, the
-clicks are also tried with the returns of the placements after and before their own.
+clicks are also tried with the returns of the placements after and before their own: each such deal is a reading of the pairs,
+and the likeliest is named (`evidence`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,9 +23,10 @@ from calib_core.association.gating import static_returns
 from calib_core.camera import Camera
 from calib_core.estimation.best_fit import quick_fit
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.evidence import log_evidence
 from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import NS_PER_S, Pair, RadarScans
+from calib_core.measurements import NS_PER_S, Facts, Pair, RadarScans
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration, DataWarning, PairResult
@@ -49,12 +51,10 @@ _SCALES_APART_S = (
 """The likeliest last: of those that fit alike, the last is named."""
 _WITHIN_DWELL_S = 4.0  # a reflector that stands still as long as it is asked to has stood for this long about a click
 _LEAST_APART = 2
-_LEAST_AGREEING = 8  # clicks, and a share of those shifted: less may agree with some pose by chance (a choice)
-_AGREEING_SHARE = 0.7  # the ends of rows have no such placement, and wrong pairs disagree (a choice)
+_LEAST_CLICKS = 8  # with a return in a deal, a choice: fewer agree with some pose by chance
+_APART = 0.01  # probability that the clocks differ by placements, shared by all deals tried: a choice
 _SOUND_SHARE = 0.6  # a pose with which more pairs agree than this, no noisier, may be off by a step, but is not turned
 _SOUND_NOISE = 1.8  # times the assumed one
-_MORE_AGREEING = 2
-_LARGEST_NOISE = 2.5  # times the assumed one; pairs that agree by chance reach 5
 _SHIFT_ROUNDS = 8  # steps of reweighted least squares (Weiszfeld); a count of pairs needs no exact shift
 _LEAST_ANGLE_RAD = np.deg2rad(0.1)  # added to each, so that no weight is infinite: less than a radar's noise
 _NEAR_RAD = np.deg2rad(4.0)  # wide of the noise, because too small a count would leave a right deal untried (a choice)
@@ -117,27 +117,28 @@ def clocks_apart(
     sound = fit is not None and agreeing > _SOUND_SHARE * len(pairs) and fit.noise_scale.max() < _SOUND_NOISE
     if len(pairs) - agreeing < _LEAST_APART:
         return []
-    best, chosen = agreeing, None
     rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
     points_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])
-    for tried in _deals(np.array(times, dtype=np.int64), sound=sound):
-        left = len(tried.clicks)
-        if left < max(_LEAST_AGREEING, best):
-            continue
+    least = max(_LEAST_CLICKS, agreeing)
+    deals = [one for one in _deals(np.array(times, dtype=np.int64), sound=sound) if len(one.clicks) >= least]
+    known = fit.camera_from_radar if fit is not None and sound else None
+    as_given = 0.0 if fit is None else log_evidence(pair_measurements(pairs, camera, options), fit)
+    best, chosen = as_given - np.log(_APART / max(len(deals), 1)), None
+    facts: Facts = {}
+    for tried in deals:
         clicks, seen = tried.clicks, tried.seen
-        if fit is not None and sound and _most_once_shifted(rays[clicks], points_m[seen], fit.camera_from_radar) < best:
+        if known is not None and _most_once_shifted(rays[clicks], points_m[seen], known) < agreeing:
             continue
         moved = [replace(pairs[a], candidates=pairs[b].candidates) for a, b in zip(clicks, seen, strict=True)]
-        other = quick_fit(pair_measurements(moved, camera, options), options, None)
-        found = 0 if other is None or other.noise_scale.max() > _LARGEST_NOISE else int(other.inliers.sum())
-        more = 0 if found == left or (tried.scales and chosen) else _MORE_AGREEING
-        if found >= max(_LEAST_AGREEING, best + more, _AGREEING_SHARE * left):
-            best, chosen = found, tried
+        measurements = pair_measurements(moved, camera, options)
+        other = quick_fit(measurements, options, None)
+        evidence = -np.inf if other is None else log_evidence(measurements, other)
+        if other is not None and evidence >= best:  # of deals alike, the time scale, which comes last
+            best, chosen = evidence, tried
+            facts = {"shifted_agreeing": int(other.inliers.sum()), "shifted_clicks": len(clicks)}
     if chosen is None:
         return []
-    facts = {
-        "shifted_agreeing": best,
-        "shifted_clicks": len(chosen.clicks),
+    facts |= {
         "placements": chosen.placements,
         "agreeing": agreeing,
         "clicks": len(pairs),

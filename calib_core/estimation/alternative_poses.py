@@ -5,9 +5,7 @@ Agreeing outliers: pairs that were set aside, but agree among themselves on anot
 Wrong pairs are wrong in different ways. If several agree, something stands where they say: a companion of the reflector such
 as a cart, or a second reflector; or the pairs that were used are the wrong ones. Whether the agreement is more than chance is
 told by the ratio of two probabilities of the outliers' pixels, with a common pose and without one. The first is integrated
-over the pose by Laplace's method, from a prior in which all rotations are equally likely:
-
-    log B = log p(pixels | pose, prior of the camera) - log(8 pi^2) + 3 log(2 pi) - log det(H) / 2.                     (7)
+over the pose as in equation (8) of `evidence`.
 
 Outliers without a common pose reach a ratio of B in at most one of B sets.
 
@@ -23,9 +21,10 @@ import numpy as np
 from calib_core.arrays import Indices, Matrix66, Values
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.evidence import log_pose_prior
 from calib_core.estimation.gnc import GncSolution, solve_gnc
 from calib_core.estimation.initialization import initial_poses
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
 from calib_core.estimation.posterior_peaks import Modes, posterior_peaks, refine_poses
 from calib_core.geometry import RigidTransform
@@ -98,7 +97,7 @@ def find_agreeing_outliers(
     as_assumed = np.zeros((len(starts), 4))
     modes = refine_poses(posterior, batch_of(starts), as_assumed, share=_SHARE, rounds=_ROUNDS)
     agree = modes.inlier > 0.5
-    ratios = np.where(agree.sum(axis=1) >= _LEAST_PAIRS, _log_ratios(modes, free.prior.sigma_m), -np.inf)
+    ratios = np.where(agree.sum(axis=1) >= _LEAST_PAIRS, _log_ratios(modes, free.prior), -np.inf)
     best = int(np.argmax(ratios))
     if not ratios[best] > _LEAST_LOG_RATIO:
         return None
@@ -121,11 +120,10 @@ def _starts(
     return (fitted, *drawn, *(one.camera_from_radar for one in solve_gnc(outliers, drawn, estimate_scale=False)))
 
 
-def _log_ratios(modes: Modes, sigma_m: float) -> Values:
-    """Return equation (7) of each mode; the camera prior's density is 1 / (pi^2 sigma^3) at its centre."""
-    # all rotations have the volume 8 pi^2 [rad^3]
-    prior = -np.log(8.0 * np.pi**2) - np.log(np.pi**2 * sigma_m**3)
-    return np.asarray(modes.evidence + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(modes.hessians)[1])
+def _log_ratios(modes: Modes, free: CameraPrior) -> Values:
+    """Return equation (8) of each mode."""
+    prior = log_pose_prior(free)
+    return np.asarray(modes.evidence + prior - 0.5 * np.linalg.slogdet(modes.hessians)[1])
 
 
 _CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75

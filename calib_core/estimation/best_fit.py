@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
-from calib_core.estimation.gnc import RADII, GncSolution, associate, mixture_cost, solve_gnc
+from calib_core.estimation.evidence import log_evidence
+from calib_core.estimation.gnc import RADII, GncSolution, associate, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measured_position import WeighedPosition, weighed_position
 from calib_core.estimation.measurement_model import PairMeasurements
@@ -26,7 +27,6 @@ NOT_MIRRORED_GAIN = -3.0
 
 _STARTS = 2
 _DECISIVE_DIFFERENCE = 30.0  # of costs, too large for other noise levels to reverse
-_COARSE_ERROR = 0.5  # of a gain from coarse fits, slightly above the largest observed
 
 
 def mirror_gain(
@@ -37,13 +37,12 @@ def mirror_gain(
     estimate_scale: bool,
     seed: int,
 ) -> float:
-    """Return the gain in twice the log-likelihood when the radar's y axis is mirrored.
+    """Return the gain in twice the log evidence when the radar's y axis is mirrored.
 
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be recognised by its
     residuals: placements on the ground fit a camera mirrored below the ground just as well. Only the camera prior, or
     placements at varied heights, distinguish the two. The 24 right-handed conventions need no test: they are rotations,
-    and the pose absorbs them. Each handedness is fitted with its own noise level, first coarsely: the gain is then
-    accurate to a few tenths, and it is refined only if it is close to a limit.
+    and the pose absorbs them. Each handedness is fitted with its own noise level.
 
     Args:
         measurements: the pairs.
@@ -59,18 +58,9 @@ def mirror_gain(
         return -np.inf
     if abs(best.cost - solutions[0].cost) > _DECISIVE_DIFFERENCE:
         return best.cost - solutions[0].cost
-    gain = -np.inf
-    for coarse in (True, False):
-        straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale, coarse=coarse)
-        other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale, coarse=coarse)
-        gain = _cost(straight) - _cost(other)
-        if all(abs(gain - limit) > _COARSE_ERROR for limit in (NOT_MIRRORED_GAIN, MIRRORED_GAIN)):
-            break
-    return gain
-
-
-def _cost(fit: ErrorsInVariablesFit) -> float:
-    return mixture_cost(fit.measurements, fit.camera_from_radar)
+    straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale)
+    other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale)
+    return 2.0 * (log_evidence(mirrored, other) - log_evidence(measurements, straight))
 
 
 _STARTS_MEASURED, _STARTS_FREE, _STARTS_QUICK = 3, 6, 3

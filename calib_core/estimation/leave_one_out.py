@@ -4,12 +4,12 @@ A pair with high leverage pulls the pose towards itself, and one with a large re
 by. Both hide an outlier. Pair i is therefore judged by the pose and the noise of the others, each found by one Newton step
 from the fit of all. With H the information, w the weights, J and e whitened as in `measurement_model`,
 
-    P = (H - w_i J_i^T J_i)^-1,    d = P (g - w_i J_i^T e_i),    e_i - J_i d ~ N(0, S_i + J_i P J_i^T),      (4)
+    P = (H - w_i J_i^T J_i)^-1,    d = P (g - w_i J_i^T e_i),    e_i - J_i d ~ N(0, S_i + J_i P J_i^T),      (7)
 
 where g is the gradient of all pairs, and S_i uses the noise scales of the others at the pose moved by d. No 6 x 6 matrix
 is inverted per pair: with C = H^-1, B = C J^T, G = J C J^T and N = (I - w G)^-1, which is 2 x 2, Woodbury's identity gives
 
-    P = C + w B N B^T,    J P = N J C,    J P J^T = N G.                                                     (5)
+    P = C + w B N B^T,    J P = N J C,    J P J^T = N G.
 
 `leave_one_out` gives the held-out figures and each pair's influence.
 """
@@ -212,7 +212,7 @@ def _noise(parts: NoiseParts, growth: np.ndarray, model: Linearization) -> Symme
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Others:
-    """The inputs of the noise scales without each pair; letters as in equation (5)."""
+    """The inputs of the noise scales without each pair; letters as in Woodbury's identity above."""
 
     parts: NoiseParts
     weights: Values

@@ -5,7 +5,7 @@ it may be off: with V0 the variance that it has where the pairs say nothing, its
 that its variance is V1 = (nu sigma^2 + |e|^2) / (nu - 2). A position that was measured to another point, with a wrong sign or
 in another unit is off by much more, with the variance W. So it is right with the probability
 
-    q = (1 - p) t(a; C + V0) / ((1 - p) t(a; C + V0) + p t(a; C + W)),                                   (8)
+    q = (1 - p) t(a; C + V0) / ((1 - p) t(a; C + V0) + p t(a; C + W)),                                   (4)
 
 t being the density of a distance whose scale the pairs estimated, and p the share of such slips.
 

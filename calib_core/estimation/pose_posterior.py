@@ -4,7 +4,7 @@ The covariance of a fit describes one peak by a parabola. With few or many wrong
 posterior is curved, has heavy tails or several peaks. A pair is an inlier with noise S, a near outlier (k times noisier), or
 an outlier, and its candidates are alternatives:
 
-    p(pixel | pose, noise) = q sum_c score_c [(1 - a) N(e_c; 0, S_c) + a N(e_c; 0, k^2 S_c)] + (1 - q) o(pixel).    (6)
+    p(pixel | pose, noise) = q sum_c score_c [(1 - a) N(e_c; 0, S_c) + a N(e_c; 0, k^2 S_c)] + (1 - q) o(pixel).    (5)
 
 Most outliers have a good click and a radar position of something else, so their pixels are spread as those of all clicks are:
 o is the density of the other clicks, mixed with an even one for clicks that are anywhere. In an aisle, where all clicks are
@@ -121,7 +121,7 @@ class _Linear:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairTerms:
-    """The parts of equation (6) at some states, as logarithms relative to the density of an outlier.
+    """The parts of equation (5) at some states, as logarithms relative to the density of an outlier.
 
     Attributes:
         linear: the candidate rows, linearized.
@@ -195,7 +195,7 @@ class PosePosterior:
         return factor * hessians, factor * gradients
 
     def pair_terms(self, poses: Poses, log_scales: np.ndarray) -> PairTerms:
-        """Evaluate equation (6) at poses, with the logarithms (s, 4) of the noise over the assumed one."""
+        """Evaluate equation (5) at poses, with the logarithms (s, 4) of the noise over the assumed one."""
         measurements = self.measurements
         factors = np.exp(2.0 * log_scales)
         linear = self._linearized(poses, factors)

@@ -2,7 +2,7 @@
 
 With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `measurement_model` is
 
-    m = h(mu; eta) + noise(V),    z = pi_K(R p(mu) + t + d) + o + noise(C).                                (3)
+    m = h(mu; eta) + noise(V),    z = pi_K(R p(mu) + t + d) + o + noise(C).                                (1)
 
 Undoing h at the current eta gives m'. The pixel then changes with eta by A = J d m' / d eta for errors of the radar, by
 d pi / d point for the reflector's offset d, and by the derivative of the lens for its errors. An error is *estimated* with the

@@ -13,10 +13,13 @@ from benchmarks.accuracy.defects.pair_defects import (
     in_other_units,
     lowered,
     mirrored,
+    with_angles,
+    with_clicks_on_drawn_returns,
     with_companion,
     with_ground_bounce,
     with_rounded_elevations,
     with_sheared_array,
+    with_squeezed_rows,
     with_zero_pair,
 )
 from benchmarks.simulated_pairs import AISLE, NoiseName, SimulatedPairs, SystematicErrors, simulate_pairs
@@ -59,6 +62,11 @@ def _moved(share: float, turn_deg: float) -> Change:
     return lambda simulated, rng: from_moved_camera(simulated, rng=rng, share=share, turn_deg=turn_deg)
 
 
+def _turned(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    """Turn the camera after the first half of the pairs, which are numbered in their order."""
+    return from_moved_camera(simulated, rng=rng, share=0.5, turn_deg=2.0, in_order=True)
+
+
 def _mirror(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
     return mirrored(simulated)
 
@@ -69,6 +77,22 @@ def _units(per_metre: float) -> Change:
 
 def _sheared(shear_deg: float) -> Change:
     return lambda simulated, rng: with_sheared_array(simulated, shear_deg)
+
+
+def _sine(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return with_angles(simulated, lambda polar: np.column_stack([polar[:, 0], np.sin(polar[:, 1]), polar[:, 2]]))
+
+
+def _halved(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return with_angles(simulated, lambda polar: polar * np.array([1.0, 1.0, 0.5]))
+
+
+def _on_drawn(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return with_clicks_on_drawn_returns(simulated, rng=rng, turn_deg=3.0)
+
+
+def _squeezed(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return with_squeezed_rows(simulated, 0.9)
 
 
 def _lower(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
@@ -171,6 +195,34 @@ _SHARED = (
         _LENS,
         Draw("focal-ti-free", "ti", errors=SystematicErrors(focal_length=0.02)),
         Draw("focal-imaging-tape", tape_m=_TAPE_M, errors=SystematicErrors(focal_length=0.02)),
+    ),
+)
+_ANGLES = (
+    "angle-scale",
+    "shared-error-suspected",
+    "intrinsics-suspected",
+    "smooth-angle-errors",
+    "residuals-too-large",
+)
+_OF_ANGLES = (
+    *_rows(
+        "azimuths reported as their sine",
+        _ANGLES,
+        Draw("sine-imaging-free", errors=None, change=_sine),
+        Draw("sine-ti-tape", "ti", tape_m=_TAPE_M, errors=None, change=_sine),
+    ),
+    *_rows(
+        "elevations reported by half, tripods of 0.5 to 1.5 m",
+        (*_ANGLES, *_TAPE),
+        Draw("halved-imaging-free", errors=None, layout=_TRIPODS, change=_halved),
+        Draw("halved-imaging-tape", tape_m=_TAPE_M, errors=None, layout=_TRIPODS, change=_halved),
+        Draw("halved-ti-free", "ti", errors=None, layout=_TRIPODS, change=_halved),
+    ),
+    *_rows(
+        "camera turned by 2 deg half-way, no times",
+        ("shared-error-suspected", "agreeing-outliers", "two-poses", "many-outliers", "residuals-too-large"),
+        Draw("turned-imaging-free", change=_turned),
+        Draw("turned-ti-free", "ti", change=_turned),
     ),
 )
 _HEIGHT = SystematicErrors(measures_elevation=False, constant_z_m=0.5)
@@ -319,6 +371,9 @@ _GAUGES = (
         SystematicErrors(principal_point_px=(0.0, 200.0)),
         codes=(*_TAPE, "intrinsics-suspected"),
     ),
+    *_gauge("elevations reported by half, all on the ground", "halved", SystematicErrors(), _halved),
+    *_gauge("clicks where a pose 3 deg off draws the returns", "drawn", SystematicErrors(), _on_drawn),
+    *_gauge("image rows squeezed to 0.9", "squeezed", SystematicErrors(), _squeezed, codes=(*_TAPE, "angle-scale")),
     *_gauge("array sheared by 2 deg", "shear", SystematicErrors(), _sheared(2.0)),
 )
-ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT, *_GAUGES)
+ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_OF_ANGLES, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT, *_GAUGES)

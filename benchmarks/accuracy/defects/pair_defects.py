@@ -84,10 +84,12 @@ def with_companion(
 
 
 def from_moved_camera(
-    simulated: SimulatedPairs, *, rng: np.random.Generator, share: float, turn_deg: float
+    simulated: SimulatedPairs, *, rng: np.random.Generator, share: float, turn_deg: float, in_order: bool = False
 ) -> SimulatedPairs:
-    """Turn the camera by an angle about a random axis for some pairs: they agree among themselves on another pose."""
-    chosen = _some(rng, len(simulated.pairs), share) & ~simulated.outlier
+    """Turn the camera by an angle about a random axis for some pairs, or the last ones: they agree on another pose."""
+    count = len(simulated.pairs)
+    chosen = np.arange(count) >= (1.0 - share) * count if in_order else _some(rng, count, share)
+    chosen = chosen & ~simulated.outlier
     axis = rng.standard_normal(3)
     turn = RigidTransform(rotation_exp(np.deg2rad(turn_deg) * axis / np.linalg.norm(axis)), np.zeros(3))
     points_camera_m = simulated.camera_from_radar @ simulated.points_radar_m
@@ -123,6 +125,33 @@ def with_sheared_array(simulated: SimulatedPairs, shear_deg: float) -> Simulated
         return range_m[:, None] * np.stack([np.sqrt(1.0 - u**2 - w**2), u, w], axis=1)
 
     return _with_positions(simulated, sheared)
+
+
+def with_angles(simulated: SimulatedPairs, change: Callable[[Points3], Points3]) -> SimulatedPairs:
+    """Report other angles: change maps true range [m], azimuth and elevation [rad] (n, 3) to those reported."""
+    return _with_positions(simulated, lambda points: cartesian_from_polar(change(polar_from_cartesian(points))))
+
+
+def with_clicks_on_drawn_returns(
+    simulated: SimulatedPairs, *, rng: np.random.Generator, turn_deg: float, sigma_px: float = 2.0
+) -> SimulatedPairs:
+    """Click where an earlier pose, turned by an angle about any axis, draws the returns, instead of the reflector."""
+    axis = rng.standard_normal(3)
+    turn = rotation_exp(np.deg2rad(turn_deg) * axis / np.linalg.norm(axis))
+    pose = RigidTransform(turn @ simulated.camera_from_radar.rotation, simulated.camera_from_radar.translation_m)
+    drawn_px = simulated.camera.project(
+        pose @ np.array([one.candidates[0].position_radar_m for one in simulated.pairs])
+    )
+    clicks_px = drawn_px + sigma_px * rng.standard_normal(drawn_px.shape)
+    pairs = tuple(replace(pair, pixel_px=px) for pair, px in zip(simulated.pairs, clicks_px, strict=True))
+    return replace(simulated, pairs=pairs)
+
+
+def with_squeezed_rows(simulated: SimulatedPairs, share: float) -> SimulatedPairs:
+    """Squeeze the image's rows, with intrinsics for the whole image."""
+    factor = np.array([1.0, share])
+    pairs = tuple(replace(pair, pixel_px=(pair.pixel_px + 0.5) * factor - 0.5) for pair in simulated.pairs)
+    return replace(simulated, pairs=pairs)
 
 
 def lowered(simulated: SimulatedPairs, by_m: float) -> SimulatedPairs:

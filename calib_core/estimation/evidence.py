@@ -1,0 +1,40 @@
+"""Evidence: how likely the clicks are under a reading of the measurements, whatever the pose.
+
+Other readings of the same pairs, such as returns of the placements before or a mirrored radar axis, are compared by the
+probability of the clicks with the pose integrated out, by Laplace's method about the fit to each:
+
+    log E = log p(pixels | pose, noise) + log p(pose, noise, errors) + (6 / 2) log(2 pi) - log det(H) / 2,        (8)
+
+with the mixture of inliers and outliers of `pose_posterior`, and relative to the pairs being outliers all. A reading whose prior
+odds are o is the likelier one if its log E exceeds the other's by -log o.
+"""
+
+import numpy as np
+
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
+from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+
+
+def log_evidence(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> float:
+    """Return equation (8) of a reading.
+
+    Args:
+        measurements: all pairs as they are read, with the assumed noise.
+        fit: to these.
+    """
+    errors = fit.measurements.errors
+    posterior = pose_posterior(measurements.with_errors(errors.values), fit.camera_from_radar)
+    (cost,) = posterior.pose_costs(batch_of([fit.camera_from_radar]), np.log(fit.noise_scale)[None])
+    hessian, _ = normal_equations(fit.measurements, fit.camera_from_radar, fit.model, fit.weights)
+    volume = np.linalg.slogdet(hessian)[1] - np.linalg.slogdet(errors.prior_information)[1]
+    return float(log_pose_prior(measurements.prior) - 0.5 * (cost + errors.squared + volume))
+
+
+def log_pose_prior(prior: CameraPrior) -> float:
+    """Return the logarithm of the density of a pose at the camera prior's position, times the (2 pi)^3 of Laplace's method.
+
+    All rotations are equally likely, and have the volume 8 pi^2 [rad^3]; the density of a weak prior is 1 / (pi^2 sigma^3).
+    """
+    return float(-np.log(8.0 * np.pi**2) - np.log(np.pi**2 * prior.sigma_m**3) + 3.0 * np.log(2.0 * np.pi))
