@@ -11,7 +11,6 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import DONE, IN_DOUBT, batch_exit_code
 from cocalib.cli.flags import INPUT, OutFile, OutFolder, Output, OutputFlags, Require, Switch, called
-from cocalib.cli.output import progress_bar
 from cocalib.platform.files import require_writable, write_whole
 from cocalib.platform.terminal import print_exactly
 
@@ -82,7 +81,7 @@ class Batch:
 
     def _calibrate(self, manifest: "Manifest") -> int:
         from cocalib.batch.driving import chosen_engine, drive
-        from cocalib.batch.job import jobs_of
+        from cocalib.batch.job import job_of
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
         from cocalib.batch.results_table import CSV_FILE, JSON_FILE, read_results, write_results
@@ -97,8 +96,7 @@ class Batch:
             engine = chosen_engine(
                 len(manifest.rows), workers=self.workers, scheduler=self.scheduler, tell=warnings.append
             )
-            with progress_bar("reading recordings") as progress_bytes:
-                jobs = jobs_of(manifest.rows, results.path, progress_bytes)
+            jobs = tuple(map(job_of, manifest.rows))
             write_plan(results.path, manifest.source, jobs)
             with shown_batch(len(jobs)) as show:
                 outcomes = drive(jobs, engine, results, show)

@@ -3,7 +3,6 @@
 import dataclasses
 import errno
 import json
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +13,7 @@ import pytest
 from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import Unsolvable
 from cocalib.batch import running_job
-from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.job import job_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import LOG_FILE, ResultsFolder
@@ -33,14 +32,9 @@ def row(tmp_path: Path) -> ManifestRow:
     )
 
 
-def job_of(row: ManifestRow, results: Path) -> Job:
-    (job,) = jobs_of([row], results)
-    return job
-
-
 def outcome_of(row: ManifestRow, results: Path) -> Outcome:
     """Run the job of a row; what is final is kept, and only that counts as done."""
-    job = job_of(row, results)
+    job = job_of(row)
     outcome = run_job(job, results)
     assert (ResultsFolder(results).outcome(job.digest) is not None) == outcome.is_final
     assert "\n" not in outcome.reason + outcome.hint
@@ -158,7 +152,7 @@ def test_a_step_fails_on_its_own(step, function, error, final, files, row, tmp_p
 
 def test_an_input_that_changes_before_or_while_the_job_runs_is_no_result(row, tmp_path, monkeypatch):
     def change(*_arguments):
-        os.utime(tmp_path / "camera.bag", (1, 1))
+        (tmp_path / "clicks.json").write_text("other")
         return Unsolvable.reported("too-few-pairs", "reason", "hint")
 
     monkeypatch.setattr(running_job, "solve_session", change)
@@ -166,7 +160,7 @@ def test_an_input_that_changes_before_or_while_the_job_runs_is_no_result(row, tm
     assert (outcome.status, outcome.is_final) == ("failed", False)
     assert "an input changed" in outcome.reason
     assert not (tmp_path / "results" / "results").exists()
-    job = job_of(row, tmp_path / "results")
+    job = job_of(row)
     with (tmp_path / "camera.bag").open("ab") as file:
         file.write(b"more")
     monkeypatch.setattr(running_job, "run_steps", raising(AssertionError("it is read")))

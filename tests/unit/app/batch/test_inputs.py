@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cocalib.batch.inputs import InputPath
-from cocalib.batch.job import jobs_of
+from cocalib.batch.job import job_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.running_job import run_job
 
@@ -87,7 +87,7 @@ def test_a_pipe_is_never_read_and_its_job_says_so(tmp_path):
     os.mkfifo(pipe)
     with pytest.raises(OSError, match="is a named pipe"):
         InputPath("recording", pipe).files()
-    (job,) = jobs_of([ManifestRow("van", "1", (pipe,))], tmp_path / "out")
+    job = job_of(ManifestRow("van", "1", (pipe,)))
     outcome = run_job(job, tmp_path / "out")
     assert outcome.status == "failed"
     assert "named pipe" in outcome.reason

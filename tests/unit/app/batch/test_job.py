@@ -11,8 +11,7 @@ import pytest
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.recordings import RecordingOptions
 from cocalib.batch import inputs
-from cocalib.batch.inputs import InputDigests, inputs_of, state_of
-from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.job import job_of
 from cocalib.batch.manifest import ManifestRow
 
 
@@ -29,17 +28,6 @@ def put(path: Path, content: str = "content", age_s: float = 60.0) -> Path:
 def row(tmp_path: Path) -> ManifestRow:
     recording = put(tmp_path / "in" / "drive.bag"), put(tmp_path / "in" / "images" / "1.jpg").parent
     return ManifestRow("van", "1", recording, place="line 3")
-
-
-@pytest.fixture(autouse=True)
-def settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Take every file as unchanged for long enough."""
-    monkeypatch.setattr(inputs, "_SETTLED_NS", 0)
-
-
-def job_of(row: ManifestRow, results: Path) -> Job:
-    (job,) = jobs_of([row], results)
-    return job
 
 
 CHANGES: dict[str, Callable[[Path], object]] = {
@@ -66,21 +54,21 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("name", [one.name for one in dataclasses.fields(ManifestRow) if one.name != "place"])
 def test_each_field_of_a_row_changes_the_digest(name, row, tmp_path):
     changed = dataclasses.replace(row, **{name: CHANGES[name](tmp_path)})
-    assert job_of(changed, tmp_path).digest != job_of(row, tmp_path).digest
+    assert job_of(changed).digest != job_of(row).digest
 
 
 def test_where_a_row_stands_and_where_its_files_lie_does_not_matter(row, tmp_path):
     shutil.copytree(tmp_path / "in", tmp_path / "copy")
     copied = tuple(tmp_path / "copy" / path.name for path in row.recording)
     moved = dataclasses.replace(row, recording=copied, place="line 9")
-    assert job_of(moved, tmp_path).digest == job_of(row, tmp_path).digest
-    assert state_of(inputs_of(moved)) == state_of(inputs_of(row))
+    assert job_of(moved).digest == job_of(row).digest
+    assert job_of(moved).state == job_of(row).state
 
 
 def test_another_version_of_the_program_makes_another_digest(row, tmp_path, monkeypatch):
-    before = job_of(row, tmp_path).digest
+    before = job_of(row).digest
     monkeypatch.setattr("cocalib.batch.job.version", lambda: "9.9.9")
-    assert job_of(row, tmp_path).digest != before
+    assert job_of(row).digest != before
 
 
 READ = (
@@ -93,9 +81,9 @@ NOT_READ = ("clicks.json", "other.bag", "images/.hidden", "drive.bag.cocalib-ses
 
 @pytest.mark.parametrize("name", [*READ, *NOT_READ])
 def test_a_file_changes_the_digest_if_it_is_read_with_the_recording(name, row, tmp_path):
-    before = job_of(row, tmp_path)
+    before = job_of(row)
     put(tmp_path / "in" / name, "another content")
-    after = job_of(row, tmp_path)
+    after = job_of(row)
     assert (after.digest != before.digest) == (after.state != before.state) == (name in READ)
 
 
@@ -103,54 +91,31 @@ def test_names_and_contents_are_not_mixed_up(tmp_path):
     one, other = tmp_path / "one" / "in", tmp_path / "other" / "in"
     put(one / "a", "b"), put(one / "c", "d")
     put(other / "a", "d"), put(other / "c", "b")
-    jobs = jobs_of([ManifestRow("van", "1", (folder,)) for folder in (one, other)], tmp_path)
-    assert jobs[0].digest != jobs[1].digest
+    assert job_of(ManifestRow("van", "1", (one,))).digest != job_of(ManifestRow("van", "1", (other,))).digest
 
 
 def test_a_missing_input_makes_a_job_too(row, tmp_path):
     missing = dataclasses.replace(row, clicks=tmp_path / "clicks.json")
-    before = job_of(missing, tmp_path)
+    before = job_of(missing)
     put(tmp_path / "clicks.json")
-    assert job_of(missing, tmp_path).digest != before.digest != job_of(row, tmp_path).digest
+    assert job_of(missing).digest != before.digest != job_of(row).digest
 
 
 def test_a_camera_of_several_in_a_file_is_told_apart(row, tmp_path):
     put(tmp_path / "cameras.yaml")
-    digests = {
-        job_of(dataclasses.replace(row, camera=tmp_path / f"cameras.yaml#{name}"), tmp_path).digest for name in "ab"
-    }
+    digests = {job_of(dataclasses.replace(row, camera=tmp_path / f"cameras.yaml#{name}")).digest for name in "ab"}
     assert len(digests) == 2
     changed = put(tmp_path / "cameras.yaml", "other")
-    assert job_of(dataclasses.replace(row, camera=Path(f"{changed}#a")), tmp_path).digest not in digests
+    assert job_of(dataclasses.replace(row, camera=Path(f"{changed}#a"))).digest not in digests
 
 
-def test_what_has_not_changed_is_not_read_again(row, tmp_path, monkeypatch):
-    read = []
-    jobs = jobs_of([row, row], tmp_path, lambda *now: read.append(now))
-    assert read == [(7, 14), (14, 14)]
-    assert jobs_of([row, row], tmp_path, lambda *now: read.append(now)) == jobs
-    assert len(read) == 2
-    put(row.recording[0], "CONTENT", age_s=59.0)  # of the same size
-    after = job_of(row, tmp_path)
-    assert after.digest != jobs[0].digest
-    assert after.state != jobs[0].state
-    monkeypatch.setattr(inputs, "_SETTLED_NS", 10**15)
-    (tmp_path / "new").mkdir()
-    for _ in range(2):  # what was changed just now is not kept
-        jobs_of([row], tmp_path / "new", lambda *now: read.append(now))
-        assert read.pop() == (14, 14)
-
-
-@pytest.mark.parametrize("kept", ["", "{", '{"schema": "cocalib/input-digests-9", "inputs": {}}', "[]"])
-def test_a_file_of_digests_that_cannot_be_read_is_as_good_as_none(kept, row, tmp_path):
-    before = job_of(row, tmp_path)
-    (tmp_path / "inputs.json").write_text(kept)
-    assert job_of(row, tmp_path) == before
-
-
-def test_drivers_that_share_a_folder_keep_what_the_others_read(row, tmp_path):
-    given = inputs_of(row)
-    one, other = InputDigests(tmp_path), InputDigests(tmp_path)
-    one.digest(given[0]), other.digest(given[1])
-    one.save(), other.save()
-    jobs_of([row], tmp_path, lambda *_: pytest.fail("read again"))
+def test_small_files_count_by_their_content_and_large_ones_by_size_and_time(row, monkeypatch):
+    before = job_of(row)
+    put(row.recording[0], age_s=59.0)
+    assert job_of(row) == before
+    changed = job_of(dataclasses.replace(row, recording=(put(row.recording[0], "CONTENT"), *row.recording[1:])))
+    assert (changed.digest != before.digest, changed.state != before.state) == (True, True)
+    monkeypatch.setattr(inputs, "_SMALL_BYTES", 1)
+    large = job_of(row)
+    put(row.recording[0], age_s=58.0)
+    assert job_of(row).digest != large.digest

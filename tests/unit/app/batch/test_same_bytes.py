@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
 from cocalib.batch import solving
-from cocalib.batch.job import jobs_of
+from cocalib.batch.job import job_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
@@ -31,7 +31,7 @@ VEHICLE = (
 
 def done(row: ManifestRow, results: Path) -> tuple[Outcome, dict[str, bytes]]:
     """Run the job of a row; return its outcome and its files."""
-    (job,) = jobs_of([row], results)
+    job = job_of(row)
     outcome = run_job(job, results)
     folder = ResultsFolder(results).folder_of(job.digest)
     files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

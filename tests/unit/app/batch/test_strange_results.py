@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import CalibrationError, InputError
-from cocalib.batch import inputs
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
-from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import read_outcome
 from cocalib.batch.plan import read_plans, write_plan
@@ -131,18 +130,6 @@ def test_results_behind_a_link_are_neither_read_nor_written_but_the_folder_itsel
     (tmp_path / "mine").symlink_to(tmp_path / "theirs")
     write(ResultsFolder(tmp_path / "mine"))
     assert ResultsFolder(tmp_path / "theirs").outcome(DIGEST) is not None
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_digests_of_inputs_are_never_read_or_written_through_something_else(kind, tmp_path, monkeypatch):
-    monkeypatch.setattr(inputs, "_SETTLED_NS", -(10**15))  # files of this moment count as settled
-    (tmp_path / "out").mkdir()
-    put(kind, tmp_path / "out" / "inputs.json")
-    (tmp_path / "a.bag").write_bytes(b"x")
-    with pytest.raises(CalibrationError, match=r"inputs\.json: is .*, not a file; it was neither read nor changed"):
-        jobs_of([ManifestRow("v", "s", (tmp_path / "a.bag",))], tmp_path / "out")
-    if kind == "link to a file":
-        assert (tmp_path / "elsewhere.json").read_text() == "theirs"
 
 
 @pytest.mark.parametrize("kind", KINDS)
