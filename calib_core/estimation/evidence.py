@@ -16,6 +16,8 @@ from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
 
+_ALL_ROTATIONS_RAD3 = 8.0 * np.pi**2  # their volume in rotation vectors [rad^3], by Haar's measure
+
 
 def log_evidence(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> float:
     """Return equation (8) of a reading.
@@ -35,6 +37,6 @@ def log_evidence(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> f
 def log_pose_prior(prior: CameraPrior) -> float:
     """Return the logarithm of the density of a pose at the camera prior's position, times the (2 pi)^3 of Laplace's method.
 
-    All rotations are equally likely, and have the volume 8 pi^2 [rad^3]; the density of a weak prior is 1 / (pi^2 sigma^3).
+    All rotations are equally likely; the density of a weak prior is 1 / (pi^2 sigma^3).
     """
-    return float(-np.log(8.0 * np.pi**2) - np.log(np.pi**2 * prior.sigma_m**3) + 3.0 * np.log(2.0 * np.pi))
+    return float(-np.log(_ALL_ROTATIONS_RAD3) - np.log(np.pi**2 * prior.sigma_m**3) + 3.0 * np.log(2.0 * np.pi))
