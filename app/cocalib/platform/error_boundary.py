@@ -2,8 +2,7 @@
 
 Expected errors are subclasses of CalibrationError and are handled where they are understood. Anything else is a bug in
 cocalib. The command, each message of a page, each HTTP request and each background task run inside `error_boundary`, so
-that a bug costs one answer and neither the session nor the page. No other module catches `Exception`, except for the code of
-plug-ins.
+that a bug costs one answer and neither the session nor the page. No other module catches `Exception`.
 """
 
 import contextlib

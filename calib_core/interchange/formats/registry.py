@@ -1,16 +1,9 @@
-"""Every format in one table. To add one: write its module, and add a line here.
+"""Every format in one table. To add one: write its module, and add a line here."""
 
-Formats of other installed packages (entry points cocalib.formats) are checked when loaded and guarded when called.
-"""
+from collections.abc import Iterator
 
-import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import cache
-from typing import Any
-
-from calib_core.errors import CalibrationError, InputError, meant
-from calib_core.interchange.format import Format, ImportedCalibration, Reads
+from calib_core.errors import InputError, meant
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.apollo import APOLLO
 from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.autoware_ai import AUTOWARE_AI
@@ -35,7 +28,6 @@ from calib_core.interchange.own.truth_json import TRUTH
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.posed_in_tree import read_joints
 from calib_core.interchange.trees.reading import JOINTS
-from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
@@ -73,21 +65,19 @@ _ONLY_READ = (
     Reads(lambda content: any(recognizes(content) for recognizes, _ in JOINTS), read_joints),
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )
-_RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})
 
 
 def written_formats() -> tuple[Format, ...]:
-    """Return every format that can be written: ours, then those of installed packages."""
-    return tuple(_written())
+    """Return every format that can be written."""
+    return (*FORMATS, *CAMERA_ONLY)
 
 
 def readers() -> Iterator[Reads]:
-    """Yield the reader of each format in the order in which they are tried; packages come after most of ours."""
+    """Yield the reader of each format in the order in which they are tried."""
     others = [known for known in FORMATS if known not in (*_OURS, *_TRIED_FIRST, MATLAB)]
     yield from _reads(*_OURS)
     yield from _ONLY_READ
-    yield from _reads(*_TRIED_FIRST, *others)
-    yield from _reads(*plugin_formats(_RESERVED), MATLAB)
+    yield from _reads(*_TRIED_FIRST, *others, MATLAB)
     yield NUMPY  # accepts any archive, as MATLAB does any mat file, to report what is wrong with it
 
 
@@ -111,102 +101,11 @@ def format_named(name: str) -> Format:
     Raises:
         InputError: there is no format of that name.
     """
-    for known in _written():
-        if known.name == name:
-            return known
-    names = [known.name for known in written_formats()]
-    raise InputError(f"unknown format {name!r}; {meant(_OTHER_NAMES.get(name, name), names)}")
-
-
-def _written() -> Iterator[Format]:
-    yield from FORMATS
-    yield from CAMERA_ONLY
-    yield from (added for added in plugin_formats(_RESERVED) if added.write is not None)
+    known = {known.name: known for known in written_formats()}
+    if name not in known:
+        raise InputError(f"unknown format {name!r}; {meant(_OTHER_NAMES.get(name, name), list(known))}")
+    return known[name]
 
 
 def _reads(*formats: Format) -> Iterator[Reads]:
     return (known.reads for known in formats if known.reads is not None)
-
-
-GROUP = "cocalib.formats"
-_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
-
-
-@cache
-def plugin_formats(reserved: frozenset[str]) -> tuple[Format, ...]:
-    """Return the formats that installed packages add, loaded once, on first use.
-
-    Args:
-        reserved: names that are already taken.
-    """
-    taken = set(reserved)
-    formats = []
-    for plugin in load_plugins(GROUP, Format):
-        name = plugin.value.name
-        if not _NAME.fullmatch(name):
-            warn_skipped(plugin.distribution, f"the format name {name!r} may contain only a-z, 0-9 and single hyphens")
-        elif name in taken:
-            warn_skipped(plugin.distribution, f"the format name {name!r} is already taken")
-        else:
-            taken.add(name)
-            formats.append(_guarded(plugin))
-    return tuple(formats)
-
-
-def _guarded(plugin: Plugin[Format]) -> Format:
-    """Return a format whose functions fail with an error that names the package."""
-    added = plugin.value
-    owner = f"the format {added.name} of the package {plugin.distribution}"
-
-    def guard(call: Any, returns: type | tuple[type, ...]) -> Any:
-        return None if call is None else _Guarded(owner, call, returns)
-
-    reads = added.reads
-    return replace(
-        added,
-        write=guard(added.write, (str, bytes)),
-        write_in_parent=guard(added.write_in_parent, (str, bytes)),
-        reads=reads
-        and Reads(
-            _GuardedRecognizer(plugin.distribution, reads.recognizes),
-            guard(reads.read, ImportedCalibration),
-            reads.beside,
-        ),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Guarded:
-    """A function of a package; what it raises, or returns with the wrong type, becomes an InputError."""
-
-    owner: str
-    call: Callable[..., Any]
-    returns: type | tuple[type, ...]
-
-    def __call__(self, *arguments: Any) -> Any:
-        try:
-            result = self.call(*arguments)
-        except CalibrationError:
-            raise
-        except Exception as error:  # a package's code may raise anything
-            raise InputError(
-                f"{self.owner} failed ({type(error).__name__}: {error}); report it to its authors"
-            ) from error
-        if not isinstance(result, self.returns):
-            raise InputError(f"{self.owner} failed (it returned {type(result).__name__}); report it to its authors")
-        return result
-
-
-@dataclass(frozen=True, slots=True)
-class _GuardedRecognizer:
-    """A package's recognizer; if it fails, the file counts as not recognized."""
-
-    distribution: str
-    call: Callable[[Content], bool]
-
-    def __call__(self, content: Content) -> bool:
-        try:
-            return bool(self.call(content))
-        except Exception as error:  # noqa: BLE001  the same
-            warn_skipped(self.distribution, f"its recognizer failed ({type(error).__name__}: {error})")
-            return False

@@ -7,11 +7,7 @@ that matches none is read by its columns alone (column_guess.py).
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Literal, get_args
-
-from calib_core.plugins import load_plugins, warn_skipped
-from calib_core.recordings.field_words import meaning_of
+from typing import Literal
 
 MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
 """sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
@@ -73,17 +69,6 @@ class Decoder:
     point_number: str | None = None
     count_field: str | None = None
     shared_with_lidars: bool = False
-
-    def __post_init__(self) -> None:
-        if isinstance(self.fields, str) or isinstance(self.polar, str) or isinstance(self.needed, str):
-            raise ValueError(f"{self.name}: fields, polar and needed are tuples of names")
-        used = (*self.polar, *self.needed, self.doppler, self.amplitude_field, self.covariance)
-        known = {name.lower() for name in self.fields}
-        missing = [name for name in used if name is not None and name.lower() not in known]
-        if missing:
-            raise ValueError(
-                f"{self.name}: {', '.join(missing)} must be among its fields, or messages without fit it too"
-            )
 
     @property
     def columns(self) -> Mapping[str, str]:
@@ -274,9 +259,6 @@ DECODERS: tuple[Decoder, ...] = (*_CLOUDS, *_CHANNELS, *_LISTS, *_ARRAYS, *_POIN
 """Every layout that is known by name."""
 
 
-GROUP = "cocalib.radar_layouts"
-
-
 def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
     """Return the layout that requires the most of these fields; None if none matches.
 
@@ -285,37 +267,5 @@ def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
         names: as the message spells them; nested ones dotted, arrays included.
     """
     have = {name.lower() for name in names}
-    fitting = [d for d in all_decoders() if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
+    fitting = [d for d in DECODERS if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
     return max(fitting, key=lambda decoder: len(decoder.fields), default=None)
-
-
-@cache
-def all_decoders() -> tuple[Decoder, ...]:
-    """Return every layout: ours, then those of installed packages, which are loaded once, on first use."""
-    known = list(DECODERS)
-    for plugin in load_plugins(GROUP, Decoder):
-        fault = _fault(plugin.value, known)
-        if fault:
-            warn_skipped(plugin.distribution, f"the radar layout {plugin.value.name!r} {fault}")
-        else:
-            known.append(plugin.value)
-    return tuple(known)
-
-
-def _fault(added: Decoder, others: Iterable[Decoder]) -> str:
-    """Return why a layout cannot be used, "" if it can."""
-    if added.kind not in get_args(MessageKind):
-        return f"has the unknown kind {added.kind!r}; known: {', '.join(get_args(MessageKind))}"
-    known = {meaning.quantity for name in added.fields if (meaning := meaning_of(name))} | added.columns.keys()
-    if not {"x", "y"} <= known and not {"range", "azimuth"} <= known:
-        return "has no position: its fields have neither x, y, z nor a range and an azimuth, and it has no polar"
-    for decoder in others:
-        if decoder.name == added.name:
-            return "has the same name as another layout"
-        if decoder.kind == added.kind and _folded(decoder.fields) == _folded(added.fields):
-            return f"is recognized by the same fields as {decoder.name!r}; it needs one more field to differ"
-    return ""
-
-
-def _folded(names: Iterable[str]) -> set[str]:
-    return {name.lower() for name in names}

@@ -106,7 +106,7 @@ def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3, rectified)
 
 def test_two_formats_do_not_write_one_file(with_k3, monkeypatch):
     twin = replace(format_named("matrix"), name="matrix-twin")
-    monkeypatch.setattr(registry, "plugin_formats", lambda _reserved: (twin,))
+    monkeypatch.setattr(registry, "FORMATS", (*FORMATS, twin))
 
     written, refused = export_all(with_k3)
 

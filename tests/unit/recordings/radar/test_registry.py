@@ -3,7 +3,7 @@
 import contextlib
 import random
 import runpy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 
 from calib_core.errors import MessageError, OptionError, RecordingError
-from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, open_recording
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
-from calib_core.recordings.radar.registry import DECODERS, GROUP, Decoder, all_decoders
+from calib_core.recordings.radar.registry import DECODERS
 from calib_core.recordings.topics import join_topics
-from tests.fake_distribution import installing
 from tests.unit.recordings.conftest import altered
 from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
 
@@ -285,72 +283,10 @@ def test_the_page_of_radar_formats_has_the_tables_of_the_registry():
     assert all(f"| {name} |" in page for name in NAMES)
 
 
-# Radar layouts of other installed packages: they decode messages; and are left out in one line where they are broken.
-
-
-ACME = """
-    from calib_core.recordings.radar.registry import Decoder
-
-    ACME = Decoder(
-        "ACME echoes", "acme_msgs/EchoArray", "list", ("slant", "squint", "closing", "loudness"),
-        polar=("slant", "squint"), doppler="closing", amplitude_field="loudness", degrees=True, azimuth_sign=-1,
-        angles="deg, azimuth positive to the right; no elevation",
-    )
-"""
-
-Install = Callable[..., Path]
-
-
-@pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    yield from installing(tmp_path / "site-packages", monkeypatch, "acme-radar", GROUP, all_decoders, ACME, "ACME")
-
-
-def test_a_layout_of_an_installed_package_decodes_its_messages(installed, ros2, write):
-    installed()
-    echo = ros2.define("acme_msgs/msg/Echo", "float32 slant\nfloat32 squint\nfloat32 closing\nfloat32 loudness\n")
-    array = ros2.define("acme_msgs/msg/EchoArray", "Header header\nacme_msgs/Echo[] echoes\n")
-    echoes = [ros2.new(echo, slant=8.0 + i, squint=10.0 * i, closing=-0.5 * i, loudness=20.0 + i) for i in range(4)]
-    message = ros2.new(array, header=ros2.header(START_NS), echoes=echoes)
-
-    with open_recording(write(ros2, [("/radar", START_NS, message)]), require=("radar",)) as recording:
-        (topic,), scans = recording.topics, recording.radar_scans()
-
-    assert "ACME echoes" in topic.layout
-    polar = np.array([[8.0 + i, np.deg2rad(-10.0 * i), 0.0] for i in range(4)])
-    np.testing.assert_allclose(scans.points_radar_m, cartesian_from_polar(polar), atol=1e-6)
-    np.testing.assert_allclose(scans.doppler_mps, [0.0, -0.5, -1.0, -1.5])
-    np.testing.assert_allclose(scans.snr_db, [20.0, 21.0, 22.0, 23.0])
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (('"ACME echoes"', '"RIO cloud"'), "the radar layout 'RIO cloud' has the same name as another"),
-        (('"list"', '"lists"'), "has the unknown kind 'lists'; known: cloud, channels, list, arrays, point"),
-        (('polar=("slant", "squint"), ', ""), "has no position"),
-        (('("slant", "squint", "closing", "loudness")', '"slant squint closing loudness"'), "are tuples of names"),
-        (('"closing", "loudness")', '"loudness")'), "closing must be among its fields"),
-        (
-            (
-                '("slant", "squint", "closing", "loudness"),\n        polar=("slant", "squint"), doppler="closing", '
-                'amplitude_field="loudness"',
-                '("Range", "azimuth", "elevation", "doppler_velocity", "amplitude"), doppler=None',
-            ),
-            "is recognized by the same fields as 'radar_msgs scan'",
-        ),
-    ],
-)
-def test_a_broken_layout_is_left_out_in_one_line_that_names_its_package(installed, caplog, change, words):
-    assert change[0] in ACME
-    installed(ACME.replace(*change))
-
-    assert all_decoders() == DECODERS
-    (record,) = caplog.records
-    assert "the package acme-radar 1.2: " in record.getMessage()
-    assert words in record.getMessage()
-
-
-def test_a_layout_that_uses_a_field_it_does_not_ask_for_is_refused():
-    with pytest.raises(ValueError, match="rate must be among its fields, or messages without fit it too"):
-        Decoder("a", "b", "list", ("range", "azimuth"), doppler="rate")
+def test_layouts_are_told_apart_and_use_only_fields_that_they_ask_for():
+    assert len(set(NAMES)) == len(NAMES)
+    kinds = [(decoder.kind, frozenset(map(str.lower, decoder.fields))) for decoder in DECODERS]
+    assert len(set(kinds)) == len(kinds)
+    for decoder in DECODERS:
+        used = (*decoder.polar, *decoder.needed, decoder.doppler, decoder.amplitude_field, decoder.covariance)
+        assert {name.lower() for name in used if name} <= {name.lower() for name in decoder.fields}, decoder.name
