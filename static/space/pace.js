@@ -16,6 +16,11 @@
   /** What has arrived is drawn after this time, whatever is typed meanwhile [ms]. */
   const LATEST = 500;
 
+  try {
+    new Intl.NumberFormat(navigator.language);
+  } catch {
+    Object.defineProperty(navigator, "language", { value: "en" }); // WebKitGTK names the locale C, which viser's plots do not survive
+  }
   const frame = window.requestAnimationFrame.bind(window);
   /** @type {Map<number, FrameRequestCallback>} */
   const waiting = new Map();
