@@ -22,7 +22,6 @@ from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS
 from calib_core.interchange.own.calibration_json import read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks
 from calib_core.interchange.own.pairs_files import read_pairs
-from calib_core.interchange.syntax.content import Content
 from calib_core.radar import AngleMap, RadarErrors
 
 
@@ -70,7 +69,7 @@ def test_formats_are_named_once_and_each_notes_what_it_lacks(file):
 
 def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(file, project_root, tmp_path, monkeypatch):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    _, recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    _, recipe = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
     angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
     (tmp_path / "calibration.json").write_text(
@@ -87,7 +86,7 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(file, project
 
 def test_the_recipe_for_radar_errors_gives_what_the_library_gives(file, project_root, tmp_path, monkeypatch):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    recipe, _, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
     for errors in (RadarErrors(), RadarErrors(0.02, -0.03, 0.12, 0.6), RadarErrors(squared_height_m2=1e3)):
         calibration = replace(file.calibration, radar_errors=errors)
@@ -97,19 +96,6 @@ def test_the_recipe_for_radar_errors_gives_what_the_library_gives(file, project_
         np.testing.assert_allclose(names["true"], errors.corrected(names["reported"]), rtol=0, atol=1e-12)
         pixels_px = calibration.camera.project(names["points_camera"])
         np.testing.assert_allclose(pixels_px, calibration.reproject(names["reported"]), rtol=0, atol=1e-8)
-
-
-def test_the_example_of_a_format_writes_and_reads(file, project_root):
-    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    _, _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(example, names)
-    acme = names["ACME_FORMAT"]
-    text = acme.write(file)
-    content = Content("lines", text=text)
-    assert acme.reads.recognizes(content)
-    back = acme.reads.read(content, "acme.txt").camera_from_radar
-    assert np.array_equal(back.as_matrix(), file.calibration.camera_from_radar.as_matrix())
 
 
 @pytest.fixture(scope="module")
