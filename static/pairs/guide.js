@@ -29,6 +29,7 @@ const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
 export function startGuide() {
   on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "layers", "proposals", "connection"], drawGuide);
+  guide.onclick = ({ target }) => target === guide.firstChild && guide.classList.toggle("whole"); // in a narrow window, a long text is folded
 }
 
 /** The focus stays where it is. @param {Key} key */
@@ -52,6 +53,7 @@ function drawGuide() {
   guide.dataset.rule = rule?.name ?? "opening";
   if (guide.dataset.said === JSON.stringify(words)) return; // said once
   guide.dataset.said = JSON.stringify(words);
+  guide.classList.remove("whole");
   guide.replaceChildren(...words.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
 }
 

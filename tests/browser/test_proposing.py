@@ -136,6 +136,18 @@ def test_under_fingers_a_proposal_is_three_times_as_large_beside_the_whole_image
     assert not (inset["x"] <= x <= inset["x"] + inset["width"] and inset["y"] <= y <= inset["y"] + inset["height"])
     assert inset["y"] + inset["height"] <= line["y"], "the line is below it"
     assert page.page.locator("#guide .primary").bounding_box()["height"] >= 40  # type: ignore[index]
+    least = page.value("document.querySelector('#guide > span').clientHeight")
+    page.page.evaluate(
+        """async () => {
+            const news = structuredClone(__cocalib.state.proposals);
+            for (const row of news.rows) row.reason = "more words ".repeat(30);
+            (await import("/proposals/proposals.js")).takeProposals(news);
+        }"""
+    )
+    page.until("document.querySelector('#guide').textContent.includes('more words')")
+    assert page.value("document.querySelector('#guide > span').clientHeight") == 2 * least
+    page.page.tap("#guide > span")
+    assert page.value("document.querySelector('#guide > span').clientHeight") > 4 * least
 
 
 @pytest.mark.slow

@@ -147,6 +147,7 @@ def hidden_and_enlarged(page: Driver) -> None:
     box = "JSON.stringify(document.getElementById('%s').getBoundingClientRect())"
     page.press("b")
     page.until(f"{box % 'space'} === {box % 'image-pane'}")
+    page.page.locator("#guide .do").first.click(trial=True)  # the line stays in front
     page.page.click("#inset")
     page.until(f"{box % 'space'} !== {box % 'image-pane'} && document.getElementById('inset').hidden")
     page.press("b")
