@@ -1,13 +1,8 @@
 """Read a whole recording, and say what is damaged, lost or undecodable: `cocalib info --verify`."""
 
-import os
 import re
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from tempfile import TemporaryFile
-from typing import IO
 
 import msgspec
 import numpy as np
@@ -44,7 +39,7 @@ class TopicCheck:
     Attributes:
         topic: its name.
         type: of its messages.
-        read: number of messages that are whole and fit their definition; of images, that can be decoded.
+        read: number of messages that are whole and fit their definition; of images, whole.
         unread: number of whole messages whose type is unknown or whose encoding is not supported.
         damaged: number of messages that are cut off, overwritten, or in a chunk with a wrong checksum.
         undecodable: number of messages that are there but do not fit their definition, or are no whole image.
@@ -76,15 +71,6 @@ class Verification(msgspec.Struct, frozen=True):
     warnings: tuple[WarningText, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Reading:
-    """How to read: the problems of topics that are not supported, whether to decode images, whom to tell."""
-
-    problems: Mapping[str, str]
-    decode_images: bool
-    progress: Progress | None
-
-
 @dataclass(slots=True)
 class _Topics:
     """The topics counted so far."""
@@ -95,23 +81,19 @@ class _Topics:
         return self.found.setdefault(name, TopicCheck(name, kind))
 
 
-def verify_recording(
-    recording: Recording, *, decode_images: bool = False, progress: Progress | None = None
-) -> Verification:
-    """Read every message of a recording, and check every checksum.
+def verify_recording(recording: Recording, *, progress: Progress | None = None) -> Verification:
+    """Read every message of a recording, and check every checksum; of images the first and the last bytes are looked at.
 
     Args:
         recording: open; it need not have a radar or a camera.
-        decode_images: decode each image instead of looking at its first and last bytes.
         progress: called with the amount done and the total, of each step.
     """
     topics = _Topics()
     problems = {
         topic.name: topic.problem for topic in recording.topics if topic.problem and topic.problem != "no messages"
     }
-    reading = _Reading(problems, decode_images, progress)
     for source in recording.sources:
-        _read_source(source, topics, reading)
+        _read_source(source, topics, problems, progress)
     warnings = recording.warnings
     checks = tuple(sorted(topics.found.values(), key=lambda value: value.topic))
     lost = any(check.damaged or check.undecodable for check in checks)
@@ -119,26 +101,26 @@ def verify_recording(
     return Verification(sound, files_of(recording), checks, tuple(map(warning_text, warnings)))
 
 
-def _read_source(source: Source, topics: _Topics, reading: _Reading) -> None:
+def _read_source(source: Source, topics: _Topics, problems: Mapping[str, str], progress: Progress | None) -> None:
     """Read one file, and count its messages."""
     if isinstance(source, ChunkedSource):
-        source.check_stored_chunks(reading.progress)
+        source.check_stored_chunks(progress)
     for channel in source.channels:
         check = topics.of(channel.topic, channel.type)
         if isinstance(source, PlainSource) and source.unreadable:
             check.damaged += len(source.unreadable)
             check.fault = check.fault or " ".join(map(str, next(iter(source.unreadable.items()))))
-        _read_channel(source, channel, check, reading)
+        _read_channel(source, channel, check, problems.get(channel.topic, ""), progress)
 
 
-def _read_channel(source: Source, channel: Channel, check: TopicCheck, reading: _Reading) -> None:
+def _read_channel(source: Source, channel: Channel, check: TopicCheck, problem: str, progress: Progress | None) -> None:
     """Read all messages of a channel in the order of the file."""
     index = source.index(channel.id)
-    reader = _Reader(channel, reading)
+    reader = _Reader(channel, problem)
     broken = undecodable = 0
     for number, row in enumerate(np.lexsort((index.offset, index.chunk)).tolist()):
-        if reading.progress is not None and number % _PROGRESS_MESSAGES == 0:
-            reading.progress(number, len(index))
+        if progress is not None and number % _PROGRESS_MESSAGES == 0:
+            progress(number, len(index))
         try:
             payload = source.read(int(index.chunk[row]), int(index.offset[row]))
         except RecordingError as error:
@@ -174,11 +156,11 @@ class _Reader:
 
     Args:
         channel: the channel.
-        reading: how to read.
+        problem: why its messages are not supported; "" if they are.
     """
 
-    def __init__(self, channel: Channel, reading: _Reading) -> None:
-        self.problem = reading.problems.get(channel.topic, "")
+    def __init__(self, channel: Channel, problem: str) -> None:
+        self.problem = problem
         self.misfit = ""
         self._definition: Definition | None = None
         self._images: ImageCheck | None = None
@@ -191,7 +173,7 @@ class _Reader:
                 self.problem = str(error)
             return
         if is_image(self._definition) and not self.problem:
-            self._images = ImageCheck(ImageLayout(self._definition, channel.topic), reading.decode_images)
+            self._images = ImageCheck(ImageLayout(self._definition, channel.topic))
 
     def read(self, payload: bytes) -> None:
         """Decode one message.
@@ -217,16 +199,13 @@ class ImageCheck:
 
     Attributes:
         layout: of the topic's messages.
-        decode: whether to decode each image.
         open_ended: number of images without an end marker, which some drivers never write.
         images: number of images checked.
     """
 
     layout: ImageLayout
-    decode: bool
     open_ended: int = 0
     images: int = 0
-    _decoder: "_Complaints" = field(default_factory=lambda: _Complaints())
 
     def check(self, payload: bytes) -> None:
         """Check one message.
@@ -244,40 +223,11 @@ class ImageCheck:
         start = payload.find(PNG_MAGIC) if self.layout.compressed else -1
         if start >= 0 and (fault := png_fault(payload[start:])):
             raise MessageError(f"topic {self.layout.topic}: an image {fault}")
-        if self.decode:
-            with self._decoder.heard() as said:
-                self.layout.image(payload)
-            if said:
-                raise MessageError(f"topic {self.layout.topic}: the decoder says: {said[0]}")
 
     def cut_off(self) -> tuple[int, str]:
         """Return how many images are cut off, and why; none if the driver writes no end markers at all."""
         habit = self.open_ended > self.images / 2
         return (0, "") if habit or not self.open_ended else (self.open_ended, _CUT)
-
-
-class _Complaints:
-    """What the image decoder prints to the standard error of the process: its only sign of damage it passes over."""
-
-    @contextmanager
-    def heard(self) -> Iterator[list[str]]:
-        """Collect the lines printed meanwhile."""
-        said: list[str] = []
-        sys.stderr.flush()
-        kept = os.dup(2)
-        with TemporaryFile() as heard:
-            os.dup2(heard.fileno(), 2)
-            try:
-                yield said
-            finally:
-                os.dup2(kept, 2)
-                os.close(kept)
-                said.extend(_lines(heard))
-
-
-def _lines(file: IO[bytes]) -> list[str]:
-    file.seek(0)
-    return [line for line in file.read(1 << 16).decode("utf-8", "replace").splitlines() if line.strip()]
 
 
 def verification_text(verification: Verification) -> str:

@@ -24,8 +24,6 @@ class Info:
     """Print JSON instead of text."""
     verify: Switch = False
     """Read every message and check every checksum; exit code 1 if anything is damaged, lost or undecodable."""
-    decode_images: Switch = False
-    """With --verify, decode every image; otherwise only its first and last bytes are looked at."""
     write: Switch = False
     """Write recording.toml beside the recording: its topics, clock and columns, which every command reads from then on."""
     topics: Topics = field(default_factory=TopicFlags)
@@ -77,7 +75,7 @@ class Info:
             self.topics.open(self.recording, ()) as recording,
             progress_bar("reading everything") as progress,
         ):
-            found = verify_recording(recording, decode_images=self.decode_images, progress=progress)
+            found = verify_recording(recording, progress=progress)
         print(
             msgspec.json.format(msgspec.json.encode(found), indent=2).decode()
             if self.json
