@@ -16,11 +16,9 @@ _CORRELATED = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualField:
-    """Residuals of all used corners, and their means over cells of the image.
+    """Means of the residuals of all used corners, projected minus found, over cells of the image.
 
     Attributes:
-        pixels_px: (n, 2) where the corners were found.
-        residuals_px: (n, 2) projected minus found.
         x_px: (c,) middles of the cells' columns.
         y_px: (r,) middles of their rows.
         means_px: (r, c, 2) of the residuals in a cell; NaN in an empty one.
@@ -31,8 +29,6 @@ class ResidualField:
         neighbour_correlation: of the residuals of corners that are next to each other on the board; about 0 for noise.
     """
 
-    pixels_px: Points2
-    residuals_px: Points2
     x_px: Values
     y_px: Values
     means_px: np.ndarray
@@ -44,7 +40,7 @@ class ResidualField:
 
     def __post_init__(self) -> None:
         grid = (len(self.y_px), len(self.x_px))
-        freeze(self, pixels_px=(None, 2), residuals_px=(None, 2), x_px=(None,), y_px=(None,))
+        freeze(self, x_px=(None,), y_px=(None,))
         freeze(self, means_px=(*grid, 2), errors_px=grid)
         freeze(self, np.int64, counts=grid)
 
@@ -79,8 +75,6 @@ def residual_field(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = _R
         errors = np.sqrt(np.square(apart).sum(axis=(0, 3)) / 2.0 * there / (there - 1.0)) / total
     energy, sigmas = _shared_energy(sums, counts)
     return ResidualField(
-        pixels,
-        residuals,
         (np.arange(columns) + 0.5) * size[0] / columns - 0.5,
         (np.arange(rows) + 0.5) * size[1] / rows - 0.5,
         means,

@@ -8,7 +8,7 @@ from calib_core.camera import Camera
 from calib_core.interchange.own.lens_documents import ImageSource
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.coverage import Coverage
-from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, ResidualField, projection_uncertainty, residual_field
+from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_uncertainty, residual_field
 from calib_core.intrinsics.split_difference import split_difference
 from calib_core.measurements import Unsolvable
 from calib_core.words.intrinsics import halves_text, residuals_text
@@ -20,7 +20,6 @@ from cocalib.view.wording import plain, sentence, with_sigma
 
 _MOST_ROWS = 400
 _WIDTH = 320.0
-_MOST_POINTS = 1500
 _LONGEST = 22.0
 
 
@@ -43,7 +42,6 @@ def lens_report_html(lens: CalibratedLens, source: ImageSource, coverage: Covera
             _uncertainty_over_the_image(lens),
             _residuals_over_the_image(lens),
             _coverage_of_views(lens, coverage),
-            _errors_of_views(lens),
             _view_table(lens),
             _left_out_table(lens),
         ),
@@ -159,17 +157,8 @@ def _pixels(value: float) -> str:
 
 
 def _residuals_over_the_image(lens: CalibratedLens) -> Markup:
-    """Return the mean residuals as arrows over the image, and all residuals as a scatter."""
-    field = residual_field(lens)
-    return tag(
-        "section",
-        tag("h2", "Residuals"),
-        tag("div", _arrows(field, lens.camera), _scatter(field), class_="two"),
-        id="residuals",
-    )
-
-
-def _arrows(found: ResidualField, camera: Camera) -> Markup:
+    """Return the mean residuals as arrows over the image."""
+    found, camera = residual_field(lens), lens.camera
     means = found.means_px.reshape(-1, 2)
     x_px, y_px = (axis.ravel() for axis in np.meshgrid(found.x_px, found.y_px))
     there = np.isfinite(means).all(axis=1)
@@ -183,18 +172,8 @@ def _arrows(found: ResidualField, camera: Camera) -> Markup:
     said = (
         f"Mean residual of each part of the image; the longest line is {plain(longest, 2)} px. {residuals_text(found)}"
     )
-    return captioned("Mean residuals", _image_map(said, camera, *shapes), said)
-
-
-def _scatter(found: ResidualField) -> Markup:
-    residuals = found.residuals_px
-    reach = max(float(np.abs(residuals).max()), 1e-3)
-    axes = Axes(-reach, reach, -reach, reach, left=90.0, top=8.0, width=138.0, height=138.0)
-    step = -(-len(residuals) // _MOST_POINTS)
-    points = [tag("circle", cx=axes.x(u), cy=axes.y(-v), r=0.9, class_="radar") for u, v in residuals[::step].tolist()]
-    rms = float(np.sqrt(np.square(residuals).sum(axis=1).mean()))
-    said = f"{len(residuals)} corners, projected minus found; root mean square distance {rms:.3f} px."
-    return captioned("All residuals", drawing(said, axes.drawn("right [px]", "down, negative [px]"), *points), said)
+    drawn = captioned("Mean residuals", _image_map(said, camera, *shapes), said)
+    return tag("section", tag("h2", "Residuals"), drawn, id="residuals")
 
 
 def _uncertainty_over_the_image(lens: CalibratedLens) -> Markup:
@@ -322,22 +301,3 @@ def _distances(lens: CalibratedLens) -> Markup:
         "by the stated size of its squares."
     )
     return captioned("Distances", drawing(said, axes.drawn("distance [m]", "RMS [px]"), *marks), said)
-
-
-def _errors_of_views(lens: CalibratedLens) -> Markup:
-    """Return the root mean square error of each view: bars where it was used, circles where it was left out."""
-    used = np.array([view.rms_px for view in lens.views])
-    held_out = np.array([view.held_out_rms_px for view in lens.views])
-    highest = max(float(np.nanmax(np.concatenate([used, held_out]))), 1e-3)
-    axes = Axes(0.0, float(len(used)), 0.0, 1.1 * highest, width=600.0)
-    step = axes.width / len(used)
-    floor = axes.y(0.0)
-    shapes: list[Child] = []
-    for index, (value, other) in enumerate(zip(used.tolist(), held_out.tolist(), strict=True)):
-        left, top = axes.left + step * (index + 0.15), axes.y(value)
-        shapes.append(tag("rect", x=left, y=top, width=0.7 * step, height=floor - top, class_="bar"))
-        if np.isfinite(other):
-            shapes.append(mark("used", left + 0.35 * step, axes.y(other)))
-    said = "Bars: RMS of the used views; dots: RMS with the lens calibrated without that view."
-    drawn = drawing(said, axes.drawn("view", "RMS [px]"), *shapes, width=644.0)
-    return tag("section", tag("h2", "Views"), captioned("Errors of the views", drawn, said), id="views")
