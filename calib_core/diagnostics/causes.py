@@ -148,10 +148,13 @@ def tested_causes(fit: SolvedFit) -> list[Tested]:
     """Test every cause; the chances are those among all of them."""
     order = _order(fit)
     null = _Null.of(fit, order)
-    kinds: dict[str, list[Tested]] = {}
+    alike: dict[tuple[bool, int], list[Cause]] = {}
     for cause in (*_constant_causes(fit, order), *_steps(fit, order)):
-        if tested := null.test(cause, _SMOOTH_VARIANCE_OF_STEPS if cause.split else _SMOOTH_VARIANCE):
-            kinds.setdefault(cause.kind, []).append(tested)
+        alike.setdefault((cause.split > 0, cause.columns.shape[2]), []).append(cause)
+    kinds: dict[str, list[Tested]] = {}
+    for (is_step, _), several in alike.items():
+        for tested in null.tests(several, _SMOOTH_VARIANCE_OF_STEPS if is_step else _SMOOTH_VARIANCE):
+            kinds.setdefault(tested.cause.kind, []).append(tested)
     return [
         replace(test, chance=min(1.0, max(1.0, _DIFFERENT * len(tests)) * test.chance / _SHARES[kind]))
         for kind, tests in kinds.items()
@@ -199,36 +202,40 @@ class _Null:
             refined.degrees_of_freedom,
         )
 
-    def test(self, cause: Cause, smooth_variance: float) -> Tested | None:
-        """Estimate a cause; None if pose and estimated errors leave nothing of the cause."""
-        count = len(self.root)
-        gain = np.zeros((len(self.residual), cause.columns.shape[2]))
-        gain[: 2 * count] = (cause.columns * self.root[:, None, None]).reshape(2 * count, -1)
-        whole = np.linalg.norm(gain, axis=0)
+    def tests(self, causes: Sequence[Cause], smooth_variance: float) -> list[Tested]:
+        """Estimate causes of as many unknowns each; those of which pose and estimated errors leave nothing are left out."""
+        count, width = len(self.root), causes[0].columns.shape[2]
+        gain = np.zeros((len(causes), len(self.residual), width))
+        columns = np.array([cause.columns for cause in causes]) * self.root[:, None, None]
+        gain[:, : 2 * count] = columns.reshape(len(causes), 2 * count, width)
+        whole = np.linalg.norm(gain, axis=1)
         gain = gain - self.explained @ (self.explained.T @ gain)
-        if (np.linalg.norm(gain, axis=0) <= _LEAST_OWN * whole).any():
-            return None
-        axes, triangle = np.linalg.qr(gain)
-        score = axes.T @ self.residual
-        left = max(self.freedom - float(score @ score), _LEAST_LEFT * self.freedom)
-        width = len(score)
-        noise = left / (self.freedom - width) if self.freedom > width + 1.0 else 1.0
-        known = axes.T @ self.uncertain
-        each = np.einsum("nrk,nrs->nks", axes[: 2 * count].reshape(count, 2, -1), self.smooth)
-        shared = each.sum(axis=0)
-        added, turned = np.linalg.eigh(shared @ shared.T - np.einsum("nks,nts->kt", each, each))
-        smooth = (turned * np.maximum(added, 0.0)) @ turned.T
-        variance = noise * np.eye(width) + known @ known.T + smooth_variance * smooth
-        statistic = float(score @ np.linalg.solve(variance, score))
-        back = np.linalg.inv(triangle)
-        sigma = np.sqrt(np.diag(back @ variance @ back.T))
-        return Tested(
-            cause,
-            tuple((back @ score).tolist()),
-            tuple(sigma.tolist()),
-            statistic,
-            _chance(statistic, self.freedom, float(width)),
+        kept = (np.linalg.norm(gain, axis=1) > _LEAST_OWN * whole).all(axis=1)
+        if not kept.any():
+            return []
+        axes, triangle = np.linalg.qr(gain[kept])
+        across = np.swapaxes(axes, 1, 2)
+        score = across @ self.residual
+        left = np.maximum(self.freedom - (score**2).sum(axis=1), _LEAST_LEFT * self.freedom)
+        noise = left / (self.freedom - width) if self.freedom > width + 1.0 else np.ones(len(left))
+        known = across @ self.uncertain
+        each = np.einsum(
+            "tnrk,nrs->tnks", axes[:, : 2 * count].reshape(-1, count, 2, width), self.smooth, optimize=True
         )
+        shared, own = each.sum(axis=1), np.swapaxes(each, 2, 3)
+        added, turned = np.linalg.eigh(shared @ np.swapaxes(shared, 1, 2) - (each @ own).sum(axis=1))
+        smooth = (turned * np.maximum(added, 0.0)[:, None]) @ np.swapaxes(turned, 1, 2)
+        variance = noise[:, None, None] * np.eye(width) + known @ np.swapaxes(known, 1, 2) + smooth_variance * smooth
+        statistic = (score * np.linalg.solve(variance, score[:, :, None])[:, :, 0]).sum(axis=1)
+        back = np.linalg.inv(triangle)
+        amount = (back @ score[:, :, None])[:, :, 0]
+        sigma = np.sqrt(np.diagonal(back @ variance @ np.swapaxes(back, 1, 2), axis1=1, axis2=2))
+        return [
+            Tested(
+                causes[k], tuple(a.tolist()), tuple(s.tolist()), float(t), _chance(float(t), self.freedom, float(width))
+            )
+            for k, a, s, t in zip(np.flatnonzero(kept).tolist(), amount, sigma, statistic, strict=True)
+        ]
 
 
 _LEAST_OWN = 1e-6  # share of a column that is left beside pose and estimated errors; less may be rounding

@@ -58,8 +58,8 @@ def mirror_gain(
         return -np.inf
     if abs(best.cost - solutions[0].cost) > _DECISIVE_DIFFERENCE:
         return best.cost - solutions[0].cost
-    straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale)
-    other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale)
+    straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale, coarse=True)
+    other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale, coarse=True)
     return 2.0 * (log_evidence(mirrored, other) - log_evidence(measurements, straight))
 
 
