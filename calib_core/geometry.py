@@ -1,6 +1,7 @@
 """Rigid transforms, named target_from_source, their algebra, and how far two poses of the same sensors are apart."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
 
@@ -212,6 +213,52 @@ class RigidTransform:
                 self.rotation @ other.rotation, self.rotation @ other.translation_m + self.translation_m
             )
         return np.asarray(other) @ self.rotation.T + self.translation_m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Many rigid transforms of the same frames, or one, as arrays.
+
+    Attributes:
+        rotations: (..., 3, 3).
+        translations_m: (..., 3).
+    """
+
+    rotations: np.ndarray
+    translations_m: np.ndarray
+
+    @classmethod
+    def of(cls, transforms: Sequence[RigidTransform]) -> "Poses":
+        """Stack transforms (s,)."""
+        return cls(np.array([one.rotation for one in transforms]), np.array([one.translation_m for one in transforms]))
+
+    @classmethod
+    def joined(cls, several: "Sequence[Poses]") -> "Poses":
+        """Concatenate batches."""
+        return cls(
+            np.concatenate([poses.rotations for poses in several]),
+            np.concatenate([poses.translations_m for poses in several]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    def perturbed(self, errors: np.ndarray) -> "Poses":
+        """Apply an error (s, 6) to each: t = t_hat + dt, R = Exp(dtheta) R_hat."""
+        return Poses(rotation_exp(errors[:, 3:]) @ self.rotations, self.translations_m + errors[:, :3])
+
+    def some(self, which: Sequence[int] | np.ndarray | slice) -> "Poses":
+        """Keep those of the given indices."""
+        return Poses(self.rotations[which], self.translations_m[which])
+
+    def transform(self, index: int) -> RigidTransform:
+        """Return one of them; its rotation is the nearest one, as steps accumulate rounding errors."""
+        u, _, vt = np.linalg.svd(self.rotations[index])
+        return RigidTransform(u @ vt, self.translations_m[index])
+
+    def transforms(self) -> list[RigidTransform]:
+        """Return all of them."""
+        return [self.transform(index) for index in range(len(self))]
 
 
 def mounting_rotation(roll_deg: float, pitch_deg: float, yaw_deg: float) -> Matrix33:

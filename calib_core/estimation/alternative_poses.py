@@ -25,9 +25,9 @@ from calib_core.estimation.evidence import log_pose_prior
 from calib_core.estimation.gnc import GncSolution, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
-from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.pose_posterior import pose_posterior
 from calib_core.estimation.posterior_peaks import Modes, posterior_peaks, refine_poses
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import Poses, RigidTransform
 
 _LEAST_PROBABILITY = 0.05
 """A peak of less need not lie in a 95 % region."""
@@ -95,7 +95,7 @@ def find_agreeing_outliers(
     starts = _starts(free, refined.camera_from_radar, rng)
     posterior = pose_posterior(free, refined.camera_from_radar)
     as_assumed = np.zeros((len(starts), 4))
-    modes = refine_poses(posterior, batch_of(starts), as_assumed, share=_SHARE, rounds=_ROUNDS)
+    modes = refine_poses(posterior, Poses.of(starts), as_assumed, share=_SHARE, rounds=_ROUNDS)
     agree = modes.inlier > 0.5
     ratios = np.where(agree.sum(axis=1) >= _LEAST_PAIRS, _log_ratios(modes, free.prior), -np.inf)
     best = int(np.argmax(ratios))

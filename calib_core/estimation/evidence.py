@@ -14,7 +14,8 @@ import numpy as np
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
-from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.pose_posterior import pose_posterior
+from calib_core.geometry import Poses
 
 _ALL_ROTATIONS_RAD3 = 8.0 * np.pi**2  # their volume in rotation vectors [rad^3], by Haar's measure
 
@@ -28,7 +29,7 @@ def log_evidence(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> f
     """
     errors = fit.measurements.errors
     posterior = pose_posterior(measurements.with_errors(errors.values), fit.camera_from_radar)
-    (cost,) = posterior.pose_costs(batch_of([fit.camera_from_radar]), np.log(fit.noise_scale)[None])
+    (cost,) = posterior.pose_costs(Poses.of([fit.camera_from_radar]), np.log(fit.noise_scale)[None])
     hessian, _ = normal_equations(fit.measurements, fit.camera_from_radar, fit.model, fit.weights)
     volume = np.linalg.slogdet(hessian)[1] - np.linalg.slogdet(errors.prior_information)[1]
     return float(log_pose_prior(measurements.prior) - 0.5 * (cost + errors.squared + volume))

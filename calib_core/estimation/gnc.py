@@ -14,7 +14,7 @@ from calib_core.arrays import Flags, Indices, Values
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.exclusive_returns import exclusive_rows, taken_twice
 from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
-from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.geometry import Poses, RigidTransform
 from calib_core.radar import cartesian_from_polar, direction_cosines
 
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
@@ -50,28 +50,6 @@ class GncSolution:
     noise_scale: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Poses:
-    """Poses as arrays: camera_from_radar rotations (..., 3, 3) and translations (..., 3)."""
-
-    rotations: np.ndarray
-    translations_m: np.ndarray
-
-    @classmethod
-    def of(cls, poses: Sequence[RigidTransform]) -> "_Poses":
-        return cls(np.array([pose.rotation for pose in poses]), np.array([pose.translation_m for pose in poses]))
-
-    def perturbed(self, steps: np.ndarray) -> "_Poses":
-        return _Poses(rotation_exp(steps[:, 3:]) @ self.rotations, self.translations_m + steps[:, :3])
-
-    def some(self, which: Sequence[int]) -> "_Poses":
-        return _Poses(self.rotations[which], self.translations_m[which])
-
-    def transforms(self) -> list[RigidTransform]:
-        u, _, vt = np.linalg.svd(self.rotations)  # the nearest rotation: steps accumulate rounding errors
-        return [RigidTransform(r, t) for r, t in zip(u @ vt, self.translations_m, strict=True)]
-
-
 def solve_gnc(
     measurements: PairMeasurements, starts: Sequence[RigidTransform], *, estimate_scale: bool
 ) -> tuple[GncSolution, ...]:
@@ -86,7 +64,7 @@ def solve_gnc(
         return ()
     scales = _NOISE_SCALES if estimate_scale else _NOISE_SCALES[:1]
     measurements = measurements.without_errors()
-    poses = _graduated(measurements, _Poses.of(starts))
+    poses = _graduated(measurements, Poses.of(starts))
     costs = _mixture_costs(measurements, poses, scales)
     best = costs.argmin(axis=1)
     solutions = [
@@ -96,7 +74,7 @@ def solve_gnc(
     return tuple(sorted(solutions, key=lambda solution: solution.cost))
 
 
-def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
+def _graduated(measurements: PairMeasurements, poses: Poses) -> Poses:
     """Run all radii from all starts at once; of the starts that end in the same pose, keep only the first."""
     measured = _of_candidates(measurements)
     for radius in RADII:
@@ -109,7 +87,7 @@ def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
     return poses.some(_distinct(poses, hessians))
 
 
-def _distinct(poses: _Poses, hessians: np.ndarray) -> list[int]:
+def _distinct(poses: Poses, hessians: np.ndarray) -> list[int]:
     """Return the indices of the poses that differ from all earlier ones."""
     kept: list[int] = []
     for i in range(len(hessians)):
@@ -127,7 +105,7 @@ def associate(measurements: PairMeasurements, pose: RigidTransform) -> tuple[Ind
 
     The choice maximises log score + log N(e; 0, S).
     """
-    return _associated(measurements, _of_candidates(measurements), _Poses(pose.rotation, pose.translation_m))
+    return _associated(measurements, _of_candidates(measurements), Poses(pose.rotation, pose.translation_m))
 
 
 def _of_candidates(measurements: PairMeasurements) -> MeasurementPlanes:
@@ -137,7 +115,7 @@ def _of_candidates(measurements: PairMeasurements) -> MeasurementPlanes:
 
 
 def _associated(
-    measurements: PairMeasurements, candidates: MeasurementPlanes, poses: _Poses
+    measurements: PairMeasurements, candidates: MeasurementPlanes, poses: Poses
 ) -> tuple[Indices, Linearization]:
     """Associate at each pose: rows (..., n), and their model."""
     model = candidates.linearize(measurements.camera, poses.rotations, poses.translations_m)
@@ -180,7 +158,7 @@ def rival_rows(measurements: PairMeasurements, pose: RigidTransform, asked: Flag
     if measurements.one_to_one:
         return found
     candidates, first = _of_candidates(measurements), measurements.first
-    rows, _ = _associated(measurements, candidates, _Poses(pose.rotation, pose.translation_m))
+    rows, _ = _associated(measurements, candidates, Poses(pose.rotation, pose.translation_m))
     model = candidates.linearize(measurements.camera, pose.rotation, pose.translation_m)
     cost = model.squared + model.log_determinant - 2.0 * measurements.log_score
     places = direction_cosines(cartesian_from_polar(measurements.reported)) / CLUSTER_SCALE
@@ -204,11 +182,11 @@ def normal_equations(
 
     The priors of the camera centre and of the k systematic errors are included.
     """
-    return _normal_equations(measurements, _Poses(pose.rotation, pose.translation_m), model, weights)
+    return _normal_equations(measurements, Poses(pose.rotation, pose.translation_m), model, weights)
 
 
 def _normal_equations(
-    measurements: PairMeasurements, poses: _Poses, model: Linearization, weights: np.ndarray
+    measurements: PairMeasurements, poses: Poses, model: Linearization, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Hessians (..., 6 + k, 6 + k) and right-hand sides, both blocks of one product of (residual, Jacobian) rows."""
     rows = model.planes[..., :-3, :, :] * np.sqrt(weights)[..., None, None, :]
@@ -252,10 +230,10 @@ def _log_odds(
 
 def mixture_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:
     """Return twice the negative log-likelihood of the mixture relative to "all are outliers", priors included."""
-    return float(_mixture_costs(measurements, _Poses.of([pose]), (1.0,))[0, 0]) + measurements.errors.squared
+    return float(_mixture_costs(measurements, Poses.of([pose]), (1.0,))[0, 0]) + measurements.errors.squared
 
 
-def _mixture_costs(measurements: PairMeasurements, poses: _Poses, scales: Sequence[float]) -> np.ndarray:
+def _mixture_costs(measurements: PairMeasurements, poses: Poses, scales: Sequence[float]) -> np.ndarray:
     """Return the costs (s, k) with all noise multiplied by each scale: S grows by its square, log det S by 4 log scale."""
     rows, model = _associated(measurements, _of_candidates(measurements), poses)
     factors = np.array(scales)[:, None]

@@ -16,7 +16,6 @@ The noise level is unknown too: one factor each on the sigmas of click, range, a
 the last three with a part in common. All functions take many states at once.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,58 +23,8 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.estimation.leave_one_out import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.measurement_model import MeasurementPlanes, PairMeasurements
-from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
+from calib_core.geometry import Poses, RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
-    """Poses camera_from_radar as arrays.
-
-    Attributes:
-        rotations: (s, 3, 3).
-        translations_m: (s, 3).
-    """
-
-    rotations: np.ndarray
-    translations_m: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.rotations)
-
-    def perturbed(self, errors: np.ndarray) -> "Poses":
-        """Apply an error (s, 6) to each pose: t = t_hat + dt, R = Exp(dtheta) R_hat."""
-        return Poses(rotation_exp(errors[:, 3:]) @ self.rotations, self.translations_m + errors[:, :3])
-
-    def some(self, which: np.ndarray | slice) -> "Poses":
-        """Keep the poses of the given indices."""
-        return Poses(self.rotations[which], self.translations_m[which])
-
-    def transform(self, index: int) -> RigidTransform:
-        """Return one of them, re-orthonormalised."""
-        u, _, vt = np.linalg.svd(self.rotations[index])
-        return RigidTransform(u @ vt, self.translations_m[index])
-
-    def transforms(self) -> list[RigidTransform]:
-        """Return all of them, re-orthonormalised."""
-        return [self.transform(index) for index in range(len(self))]
-
-
-def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
-    """Stack poses."""
-    return Poses(
-        np.array([transform.rotation for transform in transforms]),
-        np.array([transform.translation_m for transform in transforms]),
-    )
-
-
-def joined_poses(several: Sequence[Poses]) -> Poses:
-    """Concatenate batches of poses."""
-    return Poses(
-        np.concatenate([poses.rotations for poses in several]),
-        np.concatenate([poses.translations_m for poses in several]),
-    )
-
 
 NEAR_OUTLIER_SHARE, NEAR_OUTLIER_FACTOR = 0.01, 5.0
 """Of the pairs that are not outliers anywhere on the image, the share of near outliers, and how many times noisier these are."""
@@ -272,7 +221,7 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform) ->
     candidates = each.measured(np.arange(len(each.polar)))
     nothing = np.zeros((2, *candidates.polar.shape))
     unplaced = PosePosterior(measurements, candidates, log_outlier, nothing)
-    linear = unplaced._linearized_at(batch_of([reference]), np.ones((1, 4)), candidates.polar[:, None])
+    linear = unplaced._linearized_at(Poses.of([reference]), np.ones((1, 4)), candidates.polar[:, None])
     return replace(unplaced, d_polar=linear.d_polar[0])
 
 

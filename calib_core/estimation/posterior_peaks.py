@@ -20,12 +20,9 @@ from calib_core.estimation.pose_posterior import (
     NEAR_OUTLIER_FACTOR,
     PairTerms,
     PosePosterior,
-    Poses,
-    batch_of,
-    joined_poses,
     pose_posterior,
 )
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import Poses, RigidTransform
 
 _HYPOTHESES, _REFINED_HYPOTHESES, _MOST_PEAKS = 80, 16, 8
 """Number of poses drawn, of those refined as the most likely, and of peaks that are kept. A choice: more find rarer peaks in
@@ -103,7 +100,7 @@ def _hypotheses(posterior: PosePosterior, rng: "np.random.Generator") -> tuple[R
     drawn = initial_poses(posterior.measurements, most=_HYPOTHESES, rng=rng)
     if not drawn:
         return ()
-    costs = posterior.pose_costs(batch_of(drawn), np.zeros((len(drawn), 4)))
+    costs = posterior.pose_costs(Poses.of(drawn), np.zeros((len(drawn), 4)))
     return tuple(drawn[k] for k in np.argsort(costs, kind="stable")[:_REFINED_HYPOTHESES])
 
 
@@ -123,7 +120,7 @@ def _refined(
     """
     inliers = np.flatnonzero(refined.inliers)
     others = [refined.camera_from_radar, *others]
-    starts = batch_of([*others, *[refined.camera_from_radar] * len(inliers), *others])
+    starts = Poses.of([*others, *[refined.camera_from_radar] * len(inliers), *others])
     log_scales = np.zeros((len(starts), 4))
     log_scales[: -len(others)] = np.log(refined.noise_scale)
     used = np.ones((len(starts), len(posterior.measurements)), dtype=bool)
@@ -132,7 +129,7 @@ def _refined(
     modes = refine_poses(posterior, starts, log_scales, share=share, used=used, rounds=_ROUNDS_APART)
     modes = refine_poses(posterior, modes.poses, log_scales, share=share, rounds=_ROUNDS_TOGETHER)
     return (
-        joined_poses([batch_of(others[:1]), modes.poses]),
+        Poses.joined([Poses.of(others[:1]), modes.poses]),
         np.concatenate([covariance[None], _covariances(modes.hessians)]),
         np.concatenate([log_scales[:1], log_scales]),
     )

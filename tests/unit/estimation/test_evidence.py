@@ -10,7 +10,8 @@ from calib_core.estimation.best_fit import BestFit, best_fit
 from calib_core.estimation.evidence import log_evidence, log_pose_prior
 from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
-from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.pose_posterior import pose_posterior
+from calib_core.geometry import Poses
 from calib_core.options import CalibrationOptions, NoiseOptions, RadarOptions
 
 ALONE = CalibrationOptions(
@@ -36,7 +37,7 @@ def test_it_is_the_integral_over_the_pose(seed):
     hessian, _ = normal_equations(fit.measurements, fit.camera_from_radar, fit.model, fit.weights)
     root = np.linalg.cholesky(np.linalg.inv(hessian))
     drawn = np.random.default_rng(seed).standard_normal((4000, 6))
-    poses = batch_of([fit.camera_from_radar] * len(drawn)).perturbed(drawn @ root.T)
+    poses = Poses.of([fit.camera_from_radar] * len(drawn)).perturbed(drawn @ root.T)
     costs = pose_posterior(measurements, fit.camera_from_radar).pose_costs(poses, np.zeros((len(drawn), 4)))
     log_weights = 0.5 * (drawn**2).sum(axis=1) - 0.5 * costs
     average = np.logaddexp.reduce(log_weights) - np.log(len(drawn))

@@ -9,8 +9,9 @@ import pytest
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.estimation import posterior_peaks as peaks_module
 from calib_core.estimation.alternative_poses import find_agreeing_outliers, find_alternatives
-from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.pose_posterior import pose_posterior
 from calib_core.estimation.posterior_peaks import Modes, PosteriorPeaks, posterior_peaks, refine_poses
+from calib_core.geometry import Poses
 from calib_core.measurements import Pair
 from tests.solved_draws import SolvedDraw, solve_draw
 
@@ -50,7 +51,7 @@ def test_the_spread_about_a_pose_is_that_of_the_peaks_and_their_distance():
     solved = solve_draw(simulate_pairs(10, rng=np.random.default_rng(5)))
     here = solved.refined.camera_from_radar
     there = here.perturbed(np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.1]))
-    peaks = PosteriorPeaks(batch_of([here, there]), np.stack([np.eye(6), 2.0 * np.eye(6)]), np.array([0.75, 0.25]))
+    peaks = PosteriorPeaks(Poses.of([here, there]), np.stack([np.eye(6), 2.0 * np.eye(6)]), np.array([0.75, 0.25]))
     expected = 1.25 * np.eye(6)
     expected[0, 0] += 0.25 * 0.16
     expected[5, 5] += 0.25 * 0.01
@@ -71,9 +72,9 @@ def test_the_posterior_falls_away_from_the_truth_and_does_not_care_about_outlier
     posterior = pose_posterior(solved.measurements, solved.refined.camera_from_radar)
     truth = simulated.camera_from_radar
     turned = [truth.perturbed(np.array([0.0, 0.0, 0.0, 0.0, angle, 0.0])) for angle in (0.0, 0.05, 0.2, 3.0)]
-    costs = posterior.pose_costs(batch_of(turned), np.zeros((4, 4)))
+    costs = posterior.pose_costs(Poses.of(turned), np.zeros((4, 4)))
     assert (np.diff(costs) > 0.0).all() or costs[3] > costs[1] > costs[0]
-    terms = posterior.pair_terms(batch_of([truth]), np.zeros((1, 4)))
+    terms = posterior.pair_terms(Poses.of([truth]), np.zeros((1, 4)))
     assert (terms.outlier_probabilities(0.7)[0][~simulated.outlier] < 0.5).all()
 
 
