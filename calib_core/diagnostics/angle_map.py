@@ -155,13 +155,13 @@ def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points
     between, to_grid = _squared(directions, directions), _squared(grid, directions)
     bases = [np.linalg.eigh(np.exp(-0.5 * between / length_rad**2)) for length_rad in _LENGTHS_RAD]
     precisions = [1.0 / (np.outer(smooth, np.maximum(strength, 0.0)) + noise[:, None]) for strength, _ in bases]
-    log_evidence = np.array(
+    log_likelihood = np.array(
         [
             -0.5 * (precision @ (axes.T @ off_rad) ** 2 - np.log(precision).sum(axis=1)) - flat
             for precision, (_, axes) in zip(precisions, bases, strict=True)
         ]
     )
-    shares = np.exp(log_evidence - log_evidence.max())
+    shares = np.exp(log_likelihood - log_likelihood.max())
     shares = np.where(shares > _IMPROBABLE, shares, 0.0) / shares[shares > _IMPROBABLE].sum()
     mean, square, held_out = np.zeros(len(grid)), np.zeros(len(grid)), np.zeros(len(off_rad))
     for length_rad, share, precision, (_, axes) in zip(_LENGTHS_RAD, shares, precisions, bases, strict=True):

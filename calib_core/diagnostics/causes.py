@@ -124,7 +124,7 @@ class Tested:
     chance: float
 
     @property
-    def evidence(self) -> float:
+    def penalized(self) -> float:
         """The statistic less what the cause costs: its unknowns, its size beside that of such errors (Cauchy), its shape."""
         size = float(np.linalg.norm(self.amount)) * self.cause.largest / _PLAUSIBLE[self.cause.quantity]
         cost = _COST * len(self.amount) + 2.0 * float(np.log1p(size**2))
@@ -138,9 +138,9 @@ def causes(fit: SolvedFit) -> list[DataWarning]:
     tested = tested_causes(fit)
     if not any(test.chance < LEVEL for test in tested):
         return []
-    best = max(tested, key=lambda test: test.evidence)
-    beside = [test for test in tested if not test.cause.split and test.evidence > best.evidence - _BESIDE]
-    beside = sorted((test for test in beside if test is not best), key=lambda test: -test.evidence)
+    best = max(tested, key=lambda test: test.penalized)
+    beside = [test for test in tested if not test.cause.split and test.penalized > best.penalized - _BESIDE]
+    beside = sorted((test for test in beside if test is not best), key=lambda test: -test.penalized)
     return [_warning(fit, best, [] if best.cause.split else beside)]
 
 

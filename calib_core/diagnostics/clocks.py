@@ -9,7 +9,7 @@ relative to the click, an offset s of the radar's stamps satisfies a_i <= s <= b
 Clocks that differ by a dwell or more give each click the return of another placement. Where placements follow a pattern, such
 as the rows of a grid, that is a shift which most pairs agree on; only the ends of the rows do not. So where pairs disagree, the
 clicks are also tried with the returns of the placements after and before their own: each such deal is a reading of the pairs,
-and the likeliest is named (`evidence`).
+and the likeliest is named (`marginal_likelihood`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from calib_core.association.gating import static_returns
 from calib_core.camera import Camera
 from calib_core.estimation.best_fit import quick_fit
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.evidence import log_evidence
+from calib_core.estimation.marginal_likelihood import log_marginal_likelihood
 from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Facts, Pair, RadarScans
@@ -122,7 +122,7 @@ def clocks_apart(
     least = max(_LEAST_CLICKS, agreeing)
     deals = [one for one in _deals(np.array(times, dtype=np.int64), sound=sound) if len(one.clicks) >= least]
     known = fit.camera_from_radar if fit is not None and sound else None
-    as_given = 0.0 if fit is None else log_evidence(pair_measurements(pairs, camera, options), fit)
+    as_given = 0.0 if fit is None else log_marginal_likelihood(pair_measurements(pairs, camera, options), fit)
     best, chosen = as_given - np.log(_APART / max(len(deals), 1)), None
     facts: Facts = {}
     for tried in deals:
@@ -132,9 +132,9 @@ def clocks_apart(
         moved = [replace(pairs[a], candidates=pairs[b].candidates) for a, b in zip(clicks, seen, strict=True)]
         measurements = pair_measurements(moved, camera, options)
         other = quick_fit(measurements, options, None)
-        evidence = -np.inf if other is None else log_evidence(measurements, other)
-        if other is not None and evidence >= best:  # of deals alike, the time scale, which comes last
-            best, chosen = evidence, tried
+        log_likelihood = -np.inf if other is None else log_marginal_likelihood(measurements, other)
+        if other is not None and log_likelihood >= best:  # of deals alike, the time scale, which comes last
+            best, chosen = log_likelihood, tried
             facts = {"shifted_agreeing": int(other.inliers.sum()), "shifted_clicks": len(clicks)}
     if chosen is None:
         return []

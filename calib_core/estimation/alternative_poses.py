@@ -5,7 +5,7 @@ Agreeing outliers: pairs that were set aside, but agree among themselves on anot
 Wrong pairs are wrong in different ways. If several agree, something stands where they say: a companion of the reflector such
 as a cart, or a second reflector; or the pairs that were used are the wrong ones. Whether the agreement is more than chance is
 told by the ratio of two probabilities of the outliers' pixels, with a common pose and without one. The first is integrated
-over the pose as in equation (8) of `evidence`.
+over the pose as in equation (8) of `marginal_likelihood`.
 
 Outliers without a common pose reach a ratio of B in at most one of B sets.
 
@@ -21,9 +21,9 @@ import numpy as np
 from calib_core.arrays import Indices, Matrix66, Values
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.evidence import log_pose_prior
 from calib_core.estimation.gnc import GncSolution, solve_gnc
 from calib_core.estimation.initialization import initial_poses
+from calib_core.estimation.marginal_likelihood import log_pose_prior
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.estimation.pose_posterior import pose_posterior
 from calib_core.estimation.posterior_peaks import Modes, posterior_peaks, refine_poses
@@ -123,7 +123,7 @@ def _starts(
 def _log_ratios(modes: Modes, free: CameraPrior) -> Values:
     """Return equation (8) of each mode."""
     prior = log_pose_prior(free)
-    return np.asarray(modes.evidence + prior - 0.5 * np.linalg.slogdet(modes.hessians)[1])
+    return np.asarray(modes.log_likelihood + prior - 0.5 * np.linalg.slogdet(modes.hessians)[1])
 
 
 _CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
-from calib_core.estimation.evidence import log_evidence
 from calib_core.estimation.gnc import RADII, GncSolution, associate, solve_gnc
 from calib_core.estimation.initialization import initial_poses
+from calib_core.estimation.marginal_likelihood import log_marginal_likelihood
 from calib_core.estimation.measured_position import WeighedPosition, weighed_position
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.unsolved import degenerate, disagreeing
@@ -37,7 +37,7 @@ def mirror_gain(
     estimate_scale: bool,
     seed: int,
 ) -> float:
-    """Return the gain in twice the log evidence when the radar's y axis is mirrored.
+    """Return the gain in twice the log marginal likelihood when the radar's y axis is mirrored.
 
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be recognised by its
     residuals: placements on the ground fit a camera mirrored below the ground just as well. Only the camera prior, or
@@ -60,7 +60,7 @@ def mirror_gain(
         return best.cost - solutions[0].cost
     straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale, coarse=True)
     other = fit_errors_in_variables(mirrored, solutions[0], estimate_scale=estimate_scale, coarse=True)
-    return 2.0 * (log_evidence(mirrored, other) - log_evidence(measurements, straight))
+    return 2.0 * (log_marginal_likelihood(mirrored, other) - log_marginal_likelihood(measurements, straight))
 
 
 _STARTS_MEASURED, _STARTS_FREE, _STARTS_QUICK = 3, 6, 3

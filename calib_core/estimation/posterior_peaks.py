@@ -153,13 +153,13 @@ class Modes:
         poses: k of them.
         hessians: (k, 6, 6) Gauss-Newton Hessians, camera prior included.
         inlier: (k, n) probability that each pair is an inlier, whether or not it was used.
-        evidence: (k,) log likelihood of the pairs that were used, relative to all being outliers, camera prior included.
+        log_likelihood: (k,) of the pairs that were used, relative to all being outliers, camera prior included.
     """
 
     poses: Poses
     hessians: np.ndarray
     inlier: np.ndarray
-    evidence: Values
+    log_likelihood: Values
 
 
 def refine_poses(
@@ -190,8 +190,8 @@ def refine_poses(
     terms = posterior.pair_terms(poses, log_scales)
     hessians, _ = _normal_equations(posterior, poses, terms, share, counts)
     mixed = np.log1p(share * np.expm1(np.minimum(terms.pair, LARGEST_EXPONENT)))
-    evidence = np.where(counts, mixed, 0.0).sum(axis=1) - 0.5 * posterior.prior_costs(poses)
-    return Modes(poses, hessians, 1.0 - terms.outlier_probabilities(share), evidence)
+    log_likelihood = np.where(counts, mixed, 0.0).sum(axis=1) - 0.5 * posterior.prior_costs(poses)
+    return Modes(poses, hessians, 1.0 - terms.outlier_probabilities(share), log_likelihood)
 
 
 def _normal_equations(

@@ -1,4 +1,4 @@
-"""The evidence: Laplace's method against the integral itself, and which reading of the same clicks it prefers."""
+"""The marginal likelihood: Laplace's method against the integral itself, and which reading of the same clicks it prefers."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.simulated_pairs import simulate_pairs
 from calib_core.estimation.best_fit import BestFit, best_fit
-from calib_core.estimation.evidence import log_evidence, log_pose_prior
 from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.marginal_likelihood import log_marginal_likelihood, log_pose_prior
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pose_posterior import pose_posterior
 from calib_core.geometry import Poses
@@ -42,15 +42,15 @@ def test_it_is_the_integral_over_the_pose(seed):
     log_weights = 0.5 * (drawn**2).sum(axis=1) - 0.5 * costs
     average = np.logaddexp.reduce(log_weights) - np.log(len(drawn))
     integral = log_pose_prior(measurements.prior) + average + np.linalg.slogdet(root)[1]
-    assert log_evidence(measurements, fit) == pytest.approx(integral, abs=0.2)
+    assert log_marginal_likelihood(measurements, fit) == pytest.approx(integral, abs=0.2)
 
 
 def test_clicks_that_belong_to_other_returns_have_less():
     measurements, best = fitted(0)
     exchanged = replace(measurements, pixels_px=measurements.pixels_px[::-1], rays=measurements.rays[::-1])
     other = best_fit(exchanged, ALONE)
-    apart = log_evidence(measurements, best.refined) - (
-        log_evidence(exchanged, other.refined) if isinstance(other, BestFit) else 0.0
+    apart = log_marginal_likelihood(measurements, best.refined) - (
+        log_marginal_likelihood(exchanged, other.refined) if isinstance(other, BestFit) else 0.0
     )
     assert apart > 30.0
 
@@ -62,6 +62,6 @@ def test_a_pair_more_that_is_wrong_costs_little_and_one_that_is_right_adds():
         pair_measurements(pairs, simulated.camera, ALONE)
         for pairs in (simulated.pairs[:-1], simulated.pairs, (*simulated.pairs[:-1], wrong))
     )
-    base, more, worse = (log_evidence(one, best_fit(one, ALONE).refined) for one in (few, right, with_wrong))
+    base, more, worse = (log_marginal_likelihood(one, best_fit(one, ALONE).refined) for one in (few, right, with_wrong))
     assert more > base + 3.0
     assert base - 5.0 < worse < base

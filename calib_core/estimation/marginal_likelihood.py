@@ -1,12 +1,12 @@
-"""Evidence: how likely the clicks are under a reading of the measurements, whatever the pose.
+"""Marginal likelihood: how likely the clicks are under a reading of the measurements, whatever the pose.
 
 Other readings of the same pairs, such as returns of the placements before or a mirrored radar axis, are compared by the
 probability of the clicks with the pose integrated out, by Laplace's method about the fit to each:
 
-    log E = log p(pixels | pose, noise) + log p(pose, noise, errors) + (6 / 2) log(2 pi) - log det(H) / 2,        (8)
+    log L = log p(pixels | pose, noise) + log p(pose, noise, errors) + (6 / 2) log(2 pi) - log det(H) / 2,        (8)
 
 with the mixture of inliers and outliers of `pose_posterior`, and relative to the pairs being outliers all. A reading whose prior
-odds are o is the likelier one if its log E exceeds the other's by -log o.
+odds are o is the likelier one if its log L exceeds the other's by -log o.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from calib_core.geometry import Poses
 _ALL_ROTATIONS_RAD3 = 8.0 * np.pi**2  # their volume in rotation vectors [rad^3], by Haar's measure
 
 
-def log_evidence(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> float:
+def log_marginal_likelihood(measurements: PairMeasurements, fit: ErrorsInVariablesFit) -> float:
     """Return equation (8) of a reading.
 
     Args:
