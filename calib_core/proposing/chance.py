@@ -26,7 +26,7 @@ OTHER_WIDTHS = (0.71, 1.0, 1.41, 2.0, 2.83)
 width."""
 _WIDTH_STEP = 1.15
 """Factor between the widths at which an image is searched."""
-_DEALS, _DRAWN = 20, 2000
+_DEALS, _DRAWN = 40, 2000
 """Deals that are compared, and how many are drawn to find so many without a dwell that stays at its time."""
 _GUMBEL = 0.78
 """Scale of the best of many poses by chance, in its standard deviations (Gumbel's distribution of maxima)."""
@@ -35,6 +35,9 @@ _SIGMAS, _SIGMAS_CLICKED = 4.0, 2.0
 case of 300, exp(-(4 / 0.78 + 0.58)), and in one of 20 where a person vouches that a reflector is seen."""
 _LEAST_SPREAD = 2.0
 """Standard deviation of the deals at least: of few deals it is hardly known."""
+_SAMPLED = 1.1
+"""How much wider the spread is where there are more deals than are compared, so that it is an estimate: quantile of Student's
+distribution with 39 degrees of freedom at one case in 300, over the normal one, times sqrt(41 / 39)."""
 _TRIED, _REFINED = 400, 2
 """Rotations that are compared about each start, and how many of them are refined: only the score counts."""
 
@@ -74,7 +77,8 @@ class Chance:
 
     @property
     def _spread(self) -> float:
-        return max(float(self.by_chance.std()), _LEAST_SPREAD)
+        sampled = _SAMPLED if len(self.by_chance) >= _DEALS else 1.0
+        return max(sampled * float(self.by_chance.std()), _LEAST_SPREAD)
 
 
 def chance_of(

@@ -1,7 +1,7 @@
 """From dwell views, and what a person confirmed so far, to proposals."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,6 +84,9 @@ def proposals_of(
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
     if chance is None and agreement is not None:
         chance = chance_of(views, camera, options, confirmed=clicks)
+    if chance is not None and agreement is not None:
+        # deals are compared roughly: what full images do not repeat was chance
+        chance = replace(chance, score=min(chance.score, agreement.score))
     judged = _Judged.of(views, rays, agreement, by_clicks, chance)
     covered, slips = _clicks_by_dwell(rays, judged, clicks, camera)
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]

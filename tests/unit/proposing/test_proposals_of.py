@@ -24,7 +24,7 @@ from calib_core.proposing import (
     automatic_clicks,
     proposals_of,
 )
-from calib_core.proposing.chance import OTHER_WIDTHS, chance_of
+from calib_core.proposing.chance import OTHER_WIDTHS, Chance, chance_of
 from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
 from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_images_of
@@ -196,7 +196,7 @@ def test_an_echo_of_a_marked_reflector_is_not_proposed_and_says_where_it_is_mark
 
 
 def test_a_fairly_sure_proposal_says_when_its_apex_is_not_seen():
-    found = [one for seed in range(3) for one in proposed(draw_views(seed, Drawing(count=5))).ranked]
+    found = [one for seed in (3, 4) for one in proposed(draw_views(seed, Drawing(count=5))).ranked]
     fairly = [one for one in found if 0.8 <= one.confidence < 0.9]
     assert fairly
     assert all("blurred" in one.reason for one in fairly)
@@ -377,3 +377,16 @@ def _with_apex(drawn: DrawnViews, row: int) -> tuple[ImageCandidate, ...]:
     candidates = drawn.views[row].candidates
     nearest = min(candidates, key=lambda one: float(np.linalg.norm(one.pixel_px - drawn.pixels[row])))
     return tuple(replace(one, has_apex=one is nearest) for one in candidates)
+
+
+def test_a_pose_is_no_farther_beyond_chance_than_it_explains_what_full_images_show():
+    mixed = with_images_of(draw_views(1, Drawing(count=6)), draw_views(2, Drawing(count=6)))
+    found = proposals_of(mixed, CAMERA, OPTIONS, chance=Chance(1.0, 50.0, np.zeros(9), is_clicked=False))
+    assert found.chance.score == found.agreement.score < 50.0
+    assert not found.ranked
+
+
+def test_the_spread_of_deals_is_wider_where_there_are_more_than_are_compared():
+    few, many = (Chance(1.0, 0.0, np.tile([-4.0, 4.0], count), is_clicked=False) for count in (10, 20))
+    assert few.bound == pytest.approx(16.0)
+    assert many.bound == pytest.approx(1.1 * few.bound)
