@@ -7,7 +7,7 @@ from calib_core.evaluation.box_acc import judged_by_boxes
 from calib_core.evaluation.counted_returns import counted_returns
 from calib_core.evaluation.figures import BoxFigures
 from calib_core.evaluation.moving_returns import TargetOptions
-from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
+from calib_core.evaluation.target_tracking import TargetTrack, find_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Boxes, RadarScans, ReturnLabels
 from calib_core.radar import RadarErrors
@@ -34,7 +34,7 @@ def box_figures(
         scans: of the recording.
         boxes: of its frames.
         labels: the true origin of each return, which then decides instead of the radar's own targets.
-        targets: what `moving_targets` found; None searches the scans.
+        targets: what `find_targets` found; None searches the scans.
         radar_errors: of the radar, taken out before the projection.
         classes: count only targets of these classes; all if empty.
         max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
@@ -44,7 +44,7 @@ def box_figures(
         InputError: the boxes are of another recording, or no class matches.
     """
     if labels is None and targets is None:
-        targets = moving_targets(scans, options)
+        targets = find_targets([scans], options).tracks
     found = labels if labels is not None else targets or ()
     counted = counted_returns(camera, scans, boxes, found, classes=classes, max_gap_s=max_gap_s)
     return judged_by_boxes(camera_from_radar, camera, counted, radar_errors=radar_errors)

@@ -11,7 +11,7 @@ from calib_core.camera import Camera
 from calib_core.evaluation.box_acc import judged_by_boxes
 from calib_core.evaluation.counted_returns import counted_returns
 from calib_core.evaluation.figures import BoxFigures
-from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
+from calib_core.evaluation.target_tracking import TargetTrack, find_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels, TimeNs
 from calib_core.synthetic.annotations import true_boxes, true_labels
@@ -72,7 +72,7 @@ def judged_by_both(
     """Return the figures of PPM and PMM on true boxes, by the radar's own targets or by labels."""
     camera, ppm, pmm = poses_of(preset, seed, settings)
     scans, boxes, labels = _seen(recording_of(preset, seed, settings))
-    returns = counted_returns(camera, scans, boxes, labels if labelled else moving_targets(scans))
+    returns = counted_returns(camera, scans, boxes, labels if labelled else find_targets([scans]).tracks)
     return judged_by_boxes(ppm, camera, returns), judged_by_boxes(pmm, camera, returns)
 
 
@@ -105,7 +105,7 @@ def assumptions_of(seed: int, settings: Settings) -> dict[str, float]:
         "the radar's resolution of a car: an AWR1843 instead of an imaging radar": _seen(
             recording_of("cars-far", seed, settings, radar="awr1843")
         ),
-        "labels: the radar's own targets instead": (scans, boxes, moving_targets(scans)),
+        "labels: the radar's own targets instead": (scans, boxes, find_targets([scans]).tracks),
     }
     return {
         what: judged_by_boxes(ppm, camera, counted_returns(camera, *seen)).acc or 0.0 for what, seen in changed.items()

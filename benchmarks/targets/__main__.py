@@ -12,7 +12,7 @@ from benchmarks.targets.cases import CASES
 from calib_core.errors import InputError, OptionError
 from calib_core.evaluation.box_acc import judged_by_boxes
 from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
-from calib_core.evaluation.target_tracking import moving_targets
+from calib_core.evaluation.target_tracking import find_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic.annotations import true_boxes, true_labels
 from calib_core.synthetic.options import SimulationOptions
@@ -76,7 +76,7 @@ def _measure(options: SimulationOptions) -> _Draw:
     recording = simulate(options)
     scans, boxes, camera = recording.scans, true_boxes(recording), recording.camera
     truth = counted_returns(camera, scans, boxes, true_labels(recording))
-    own = counted_returns(camera, scans, boxes, moving_targets(scans))
+    own = counted_returns(camera, scans, boxes, find_targets([scans]).tracks)
     pose = recording.camera_from_radar
     by_targets = judged_by_boxes(pose, camera, own)
     return _Draw(

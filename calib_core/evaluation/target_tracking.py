@@ -190,19 +190,6 @@ class _Target:
     ended: bool = False
 
 
-def moving_targets(scans: RadarScans, options: TargetOptions | None = None) -> tuple[TargetTrack, ...]:
-    """Find and follow the moving targets of a recording, from its radar returns alone.
-
-    Args:
-        scans: of the whole recording, or of a part without gaps.
-        options: None takes the defaults.
-
-    Raises:
-        InputError: the sensors are said to move, but the radar measures no Doppler speeds.
-    """
-    return find_targets([scans], options).tracks
-
-
 def find_targets(
     windows: Iterable[RadarScans],
     options: TargetOptions | None = None,

@@ -28,8 +28,7 @@ def search_boards(
     images: BoardImages,
     board: Board,
     *,
-    known: tuple[BoardCorners, ...] = (),
-    searched: Collection[int] = (),
+    known: SearchProgress | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> BoardSearch | Unsolvable:
@@ -40,12 +39,11 @@ def search_boards(
     Args:
         images: where to look.
         board: what to look for.
-        known: views of an earlier search, which are not looked for again.
-        searched: numbers of the images that the earlier search looked at.
+        known: how far an earlier search came; its images are not looked at again.
         progress: called from this thread while the search runs.
         stopped: asked between images; once it is true the search ends with what was found.
     """
-    search = _Search(images, board, known, searched)
+    search = _Search(images, board, known or SearchProgress(0, 0))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         for _ in search.run(pool):
             if progress is not None:
@@ -58,15 +56,13 @@ def search_boards(
 class _Search:
     """A search, and what it has found so far."""
 
-    def __init__(
-        self, images: BoardImages, board: Board, known: Sequence[BoardCorners], searched: Collection[int]
-    ) -> None:
+    def __init__(self, images: BoardImages, board: Board, known: SearchProgress) -> None:
         self._images = images
         self._board = board
-        self._views = {view.index: view for view in known}
-        self._seen = {*searched, *self._views}
+        self._views = {view.index: view for view in known.views}
+        self._seen = set(known.indices)
         self._unreadable: dict[int, str] = {}
-        self._sizes: Counter[tuple[int, int]] = Counter(view.size_px for view in known)
+        self._sizes: Counter[tuple[int, int]] = Counter(view.size_px for view in known.views)
         self._order = ImageOrder(len(images), images.time_ns)
         self._complete = False
         self._shown: dict[int, tuple[int, int] | None] = {}  # other boards in images that were asked for them
@@ -154,8 +150,6 @@ class _Search:
             tuple(sorted(left_out, key=lambda one: one.index)),
             len(self._seen),
             self._complete,
-            tuple(sorted(self._seen)),
-            self._sorted_views(),
         )
 
     def _is_rather_of_another_board(self) -> bool:

@@ -209,8 +209,6 @@ class BoardSearch:
         left_out: the others in which the board is, or was expected, with the reason.
         searched: how many images were looked at.
         complete: whether all were; False after a canceled search.
-        indices: their numbers, ascending.
-        found: all views that were found, the ones left out included, for a search that goes on from here.
     """
 
     board: Board
@@ -219,8 +217,6 @@ class BoardSearch:
     left_out: tuple[LeftOutImage, ...]
     searched: int
     complete: bool = True
-    indices: tuple[int, ...] = ()
-    found: tuple[BoardCorners, ...] = ()
 
     @property
     def coverage(self) -> Coverage:

@@ -1,6 +1,6 @@
 """The contents of a recording as plain values and as text, for `cocalib info --json` and `cocalib info`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -343,7 +343,7 @@ def summary_text(summary: RecordingSummary) -> str:
     """Format a summary as text: one fact per line, numbers with units, warnings last."""
     lines = [
         *_labelled(
-            "files", _columns([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
+            "files", aligned([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
         ),
         *_times(summary),
         "",
@@ -414,7 +414,7 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 _times_used(topic),
             )
         )
-    lines = list(_columns(rows, right={3, 4, 5, 6}))
+    lines = list(aligned(rows, right={3, 4, 5, 6}))
     problems = [
         topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}"
         for topic in topics
@@ -506,7 +506,7 @@ def _sensors(summary: RecordingSummary) -> list[str]:
                 _topics_of(sensor),
             )
         )
-    return [*_columns(rows, right={3, 4, 5, 6}), summary.radar.choice]
+    return [*aligned(rows, right={3, 4, 5, 6}), summary.radar.choice]
 
 
 def _topics_of(sensor: RadarSensor) -> str:
@@ -523,7 +523,7 @@ def _readings(radar: RadarSummary) -> list[str]:
         return []
     rows = [("quantity", "read from", "unit", "grows", "known by")]
     rows += [(column.quantity, column.column, column.unit, column.sign, column.why) for column in radar.columns]
-    return list(_columns(rows))
+    return list(aligned(rows))
 
 
 def _camera_lines(camera: CameraSummary | None) -> list[str]:
@@ -563,8 +563,13 @@ def _intrinsics(camera: CameraSummary) -> str:
     )
 
 
-def _columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] | set[int] = frozenset()) -> Iterable[str]:
-    """Pad cells to align the columns."""
+def aligned(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> Iterator[str]:
+    """Yield the lines of a table.
+
+    Args:
+        rows: the cells of each, as many in every row; the heads come first.
+        right: numbers of the columns that are aligned to the right.
+    """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
     for row in rows:
         cells = [

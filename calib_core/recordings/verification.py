@@ -1,7 +1,7 @@
 """Read a whole recording, and say what is damaged, lost or undecodable: `cocalib info --verify`."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import msgspec
@@ -17,7 +17,7 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.messages.foxglove import ros_message
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import LOSSES, Recording
-from calib_core.recordings.summary import FileSummary, files_of
+from calib_core.recordings.summary import FileSummary, aligned, files_of
 from calib_core.words.outcomes import WarningText, warning_text
 
 _PROGRESS_MESSAGES = 200
@@ -232,10 +232,11 @@ class ImageCheck:
 
 def verification_text(verification: Verification) -> str:
     """Format a verification as text: files, messages by topic, the result last."""
+    rows = [("topic", *_COUNTS), *((topic.topic, *map(str, _counts(topic))) for topic in verification.topics)]
     lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in verification.files]
     lines += [
         "",
-        *_table(verification),
+        *aligned(rows, right=range(1, 1 + len(_COUNTS))),
         *(f"  {one.topic}: {one.fault}" for one in verification.topics if one.fault),
         "",
     ]
@@ -243,14 +244,6 @@ def verification_text(verification: Verification) -> str:
         lines.append(f"warning   {warning.message}. [{warning.code}]")
     lines.append(f"result    {_result(verification)}")
     return "\n".join(line.rstrip() for line in lines)
-
-
-def _table(verification: Verification) -> Iterator[str]:
-    rows = [("topic", *_COUNTS), *((topic.topic, *map(str, _counts(topic))) for topic in verification.topics)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for name, *counts in rows:
-        cells = [count.rjust(width) for count, width in zip(counts, widths[1:], strict=True)]
-        yield "  ".join([name.ljust(widths[0]), *cells])
 
 
 def _counts(check: TopicCheck) -> tuple[int, ...]:

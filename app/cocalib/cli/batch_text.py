@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from calib_core.recordings import aligned
 from cocalib.platform.terminal import terminal_stream
 from cocalib.view.wording import plain
 
@@ -30,10 +31,7 @@ def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
 def status_lines(table: "BatchResults") -> "Iterator[str]":
     """Return the table of results, and why there is no calibration, or one in doubt."""
     heads = ("vehicle", "session", "recorded", "verdict", "deg 95 %", "cm 95 %", "AED px")
-    rows = [heads, *map(_cells, table.sessions)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
+    yield from aligned([heads, *map(_cells, table.sessions)])
     yield ""
     yield _counts(table.sessions)
     yield from _why_lines(table.sessions)

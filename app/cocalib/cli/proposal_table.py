@@ -8,6 +8,7 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, Proposals
 from calib_core.proposing.proposals import named_proposals
+from calib_core.recordings import aligned
 from calib_core.words.warnings import probability_text
 
 _HEAD = ("id", "time [s]", "range [m]", "column [px]", "row [px]", "sigma [px]", "confidence", "reason")
@@ -38,7 +39,7 @@ def proposal_lines(
         for name, one in named_proposals(proposals, views, confirmed)
     ]
     return [
-        *(_table_lines([_HEAD, *rows]) if rows else []),
+        *(aligned([_HEAD, *rows], right=range(1, len(_HEAD) - 1)) if rows else []),
         *unproposed_lines(proposals, origin),
         _summary(proposals, confirmed),
     ]
@@ -50,18 +51,6 @@ def unproposed_lines(proposals: Proposals, origin: TimeNs) -> list[str]:
         f"not proposed: the placement from {_seconds(placement.start, origin):.1f} to {_seconds(placement.end, origin):.1f} s, "
         f"{_range_m(placement):.1f} m away: {reason}"
         for placement, reason in proposals.unproposed
-    ]
-
-
-def _table_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Lay out rows in columns: figures to the right, the id and the last column to the left."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            text.ljust(width) if column in (0, len(row) - 1) else text.rjust(width)
-            for column, (text, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
     ]
 
 

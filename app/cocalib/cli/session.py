@@ -153,6 +153,8 @@ def _click_count(count: int, what: str) -> str:
 
 
 def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
+    from calib_core.recordings import aligned
+
     rows = [("state", "clicks", "steps", "last change", "recording", "folder")]
     rows += [
         (
@@ -165,8 +167,7 @@ def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
         )
         for each in sessions
     ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines = list(aligned(rows))
     for index, each in reversed(list(enumerate(sessions, start=1))):
         if each.about:
             lines.insert(index + 1, f"  {each.about}")

@@ -10,7 +10,7 @@ import re
 import typing
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, Literal, TypeVar
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
@@ -41,48 +41,20 @@ class Argument:
 
 
 @dataclass(frozen=True, slots=True)
-class UnknownArgument:
-    """The command does not know this argument."""
-
-    token: str
-
-
-@dataclass(frozen=True, slots=True)
-class MissingArguments:
-    """Required arguments are missing."""
-
-    arguments: tuple[Argument, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class MissingValue:
-    """An option has no value."""
-
-    argument: Argument
-
-
-@dataclass(frozen=True, slots=True)
-class WrongChoice:
-    """An option has a value that is not one of its choices."""
-
-    argument: Argument
-    value: str
-    choices: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class BadValue:
-    """An option has a value of the wrong type.
+class Fault:
+    """What is wrong with the arguments of a command.
 
     Attributes:
-        typed: the value; None if unknown.
+        kind: an unknown argument, required ones that are missing, an option without a value or with a wrong one.
+        typed: the unknown argument, or the wrong value; None if that is not known.
+        arguments: those that it is about.
+        choices: of the option's value, if there are such.
     """
 
-    argument: Argument
-    typed: str | None
-
-
-Fault: TypeAlias = UnknownArgument | MissingArguments | MissingValue | WrongChoice | BadValue
+    kind: Literal["unknown", "missing", "no value", "wrong value"]
+    typed: str | None = None
+    arguments: tuple[Argument, ...] = ()
+    choices: tuple[str, ...] = ()
 
 
 _VALUES = ConstructorRegistry()
@@ -186,21 +158,21 @@ def _fault(event: Any) -> Fault | None:
     """Translate a tyro event; None for one whose message is left to tyro."""
     match type(event).__name__:
         case "UnrecognizedArgs":
-            return UnknownArgument(event.tokens[0])
+            return Fault("unknown", event.tokens[0])
         case "MissingArgs" if event.unrecognized_tokens:
-            return UnknownArgument(event.unrecognized_tokens[0])
+            return Fault("unknown", event.unrecognized_tokens[0])
         case "MissingArgs":
-            return MissingArguments(tuple(_argument(missing.arg) for missing in event.missing_arguments))
+            return Fault("missing", None, tuple(_argument(missing.arg) for missing in event.missing_arguments))
         case "BadValue":
-            return MissingValue(_argument(event.argument))
+            return Fault("no value", None, (_argument(event.argument),))
         case "InvalidChoice":
             given = [choice for choice in event.choices if choice != "None"]  # unset is nothing to type
             choices = event.choices if len(given) == len(event.choices) else sorted(given)
-            return WrongChoice(_argument(event.argument), event.value, tuple(choices))
+            return Fault("wrong value", event.value, (_argument(event.argument),), tuple(choices))
         case "InstantiationFailure" if event.argument is not None:
             typed = re.search(r"'([^']*)'$|instantiated from \[(.*?)\]", event.message)
             words = typed and (typed[1] if typed[2] is None else typed[2].replace("', '", " ").strip("'"))
-            return BadValue(_argument(event.argument), words)
+            return Fault("wrong value", words, (_argument(event.argument),))
     return None
 
 

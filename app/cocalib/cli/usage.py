@@ -6,17 +6,7 @@ from typing import NoReturn
 
 from calib_core.errors import InputError
 from cocalib.cli.commands import PROGRAM, Command, Runnable
-from cocalib.cli.tyro_hook import (
-    Argument,
-    BadValue,
-    Fault,
-    MissingArguments,
-    MissingValue,
-    UnknownArgument,
-    WrongChoice,
-    flags_of,
-    parse,
-)
+from cocalib.cli.tyro_hook import Argument, Fault, flags_of, parse
 from cocalib.platform.terminal import with_colours
 
 _MEANT = {"format": "--to", "o": "--out", "file": "--out", "intrinsics": "--camera", "extrinsics": "--calibration"}
@@ -48,23 +38,21 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
 
 def _reason(fault: Fault, kind: type[Runnable]) -> str:
     """Return what is wrong."""
-    match fault:
-        case UnknownArgument(token):
-            return _unknown(token, kind)
-        case MissingArguments(arguments):
-            return f"{' and '.join(map(_argument_text, arguments))} {'is' if len(arguments) == 1 else 'are'} missing"
-        case MissingValue(argument):
-            return f"{argument.name} needs a value: {_argument_text(argument)}"
-        case WrongChoice(argument, value, choices) if near := get_close_matches(value.lower(), choices, n=1):
-            return f"{argument.name} {value}: did you mean {near[0]}?"
-        case WrongChoice(argument, value, choices):
-            return f"{argument.name} takes {_alternatives(choices)}, not '{value}'"
-        case BadValue(argument, typed):
-            what = _NUMBERS.get(argument.value, argument.value)
-            only = "" if argument.value in _NUMBERS else ", as numbers like 0.5, without units"
-            return f"{argument.name} takes {what}{only}" + (
-                f", not '{typed}'" if typed else "; the given value is invalid"
-            )
+    named, typed = " and ".join(map(_argument_text, fault.arguments)), fault.typed
+    if fault.kind == "unknown":
+        return _unknown(typed or "", kind)
+    if fault.kind == "missing":
+        return f"{named} {'is' if len(fault.arguments) == 1 else 'are'} missing"
+    (argument,) = fault.arguments
+    if fault.kind == "no value":
+        return f"{argument.name} needs a value: {named}"
+    if fault.choices:
+        near = get_close_matches((typed or "").lower(), fault.choices, n=1)
+        wanted = f"{argument.name} takes {_alternatives(fault.choices)}, not '{typed}'"
+        return f"{argument.name} {typed}: did you mean {near[0]}?" if near else wanted
+    what = _NUMBERS.get(argument.value, argument.value)
+    only = "" if argument.value in _NUMBERS else ", as numbers like 0.5, without units"
+    return f"{argument.name} takes {what}{only}" + (f", not '{typed}'" if typed else "; the given value is invalid")
 
 
 def _argument_text(argument: Argument) -> str:

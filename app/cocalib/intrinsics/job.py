@@ -2,13 +2,13 @@
 
 import logging
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.intrinsics.board import Board
-from calib_core.intrinsics.board_images import BoardCorners, BoardImages
+from calib_core.intrinsics.board_images import BoardImages
 from calib_core.intrinsics.board_search import search_boards
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.calibrating import calibrate_lens
@@ -128,8 +128,7 @@ class LensJob:
                     images,
                     board,
                     model,
-                    known=known.views if known else (),
-                    searched=known.indices if known else (),
+                    known=known,
                     progress=self._take,
                     stopped=stop.is_set,
                 )
@@ -167,8 +166,7 @@ def calibrate_from(
     board: Board,
     model: LensChoice = "auto",
     *,
-    known: tuple[BoardCorners, ...] = (),
-    searched: Collection[int] = (),
+    known: SearchProgress | None = None,
     progress: Callable[[SearchProgress | str], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[BoardSearch, CalibratedLens] | Unsolvable:
@@ -178,12 +176,11 @@ def calibrate_from(
         images: where to look.
         board: what to look for.
         model: of the lens.
-        known: views of an earlier search.
-        searched: numbers of the images that it looked at.
+        known: how far an earlier search came.
         progress: called while the board is looked for, and then with what is done next, in words.
         stopped: asked often; once it is true there is no calibration.
     """
-    search = search_boards(images, board, known=known, searched=searched, progress=progress, stopped=stopped)
+    search = search_boards(images, board, known=known, progress=progress, stopped=stopped)
     if isinstance(search, Unsolvable):
         return search
     if stopped():

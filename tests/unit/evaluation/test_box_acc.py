@@ -9,7 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.evaluation.box_acc import AXES, grouped_error, judged_by_boxes
 from calib_core.evaluation.counted_returns import counted_returns, renamed_classes
-from calib_core.evaluation.target_tracking import moving_targets
+from calib_core.evaluation.target_tracking import find_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import (
     NS_PER_S,
@@ -181,7 +181,7 @@ def test_own_targets_say_how_many_returns_have_no_box_and_that_the_loss_is_unkno
 
 @pytest.mark.slow
 def test_which_returns_count_and_their_boxes_do_not_depend_on_the_calibration(crowd):
-    targets = moving_targets(crowd.scans)
+    targets = find_targets([crowd.scans]).tracks
     figures = [
         box_figures(pose, CAMERA, crowd.scans, crowd.boxes, targets=targets)
         for pose in (TRUE_POSE, turned(TRUE_POSE, 1, 10.0), turned(TRUE_POSE, 0, -4.0), turned(TRUE_POSE, 1, 180.0))
@@ -198,7 +198,7 @@ def test_which_returns_count_and_their_boxes_do_not_depend_on_the_calibration(cr
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("angle_deg", [-10.0, 10.0])
 def test_a_calibration_turned_by_ten_degrees_scores_near_chance(crowd, axis, angle_deg):
-    targets = moving_targets(crowd.scans)
+    targets = find_targets([crowd.scans]).tracks
     right = box_figures(TRUE_POSE, CAMERA, crowd.scans, crowd.boxes, targets=targets)
     wrong = box_figures(turned(TRUE_POSE, axis, angle_deg), CAMERA, crowd.scans, crowd.boxes, targets=targets)
 
@@ -211,7 +211,7 @@ def test_a_calibration_turned_by_ten_degrees_scores_near_chance(crowd, axis, ang
 
 
 def test_a_small_turn_never_gains_more_than_noise(crowd):
-    targets = moving_targets(crowd.scans)
+    targets = find_targets([crowd.scans]).tracks
     figures = box_figures(TRUE_POSE, CAMERA, crowd.scans, crowd.boxes, targets=targets)
     yaw = next(curve for curve in figures.sensitivity if curve.axis == "yaw")
 

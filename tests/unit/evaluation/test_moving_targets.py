@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.evaluation.moving_returns import TargetOptions
-from calib_core.evaluation.target_tracking import find_targets, moving_targets
+from calib_core.evaluation.target_tracking import find_targets
 from calib_core.measurements import RadarScans, TimeNs
 from tests.scans import scan_of
 from tests.street import Street, street
@@ -30,7 +30,7 @@ def purity(scene: Street, targets) -> float:
 
 def test_one_walker_is_one_target_and_what_stands_still_is_none():
     scans = scans_of(lambda s: [(10 + s, 1, 0), (10 + s, 1.3, 0), (20, 3, 0)], lambda s: [1.0, 1.0, 0.0])
-    (target,) = moving_targets(scans)
+    (target,) = find_targets([scans]).tracks
 
     assert target.rows.tolist() == [row for row in range(90) if row % 3 < 2]
     assert target.scans.tolist() == list(range(30))
@@ -40,7 +40,7 @@ def test_one_walker_is_one_target_and_what_stands_still_is_none():
 
 def test_two_walkers_apart_are_two_targets_with_ids_of_their_own():
     scans = scans_of(lambda s: [(10 + s, 4, 0), (10 + s, -4, 0)], lambda s: [1.0, 1.0])
-    targets = moving_targets(scans)
+    targets = find_targets([scans]).tracks
 
     assert [target.id for target in targets] == ["target-1", "target-2"]
     assert [set((target.rows % 2).tolist()) for target in targets] == [{0}, {1}]
@@ -52,12 +52,12 @@ def test_a_target_that_is_unseen_for_long_ends_and_another_is_born(seen_again_s,
         return not 1.0 <= s < seen_again_s
 
     scans = scans_of(lambda s: [(10 + s, 0, 0)] * seen(s), lambda s: [1.0] * seen(s), 40)
-    assert len(moving_targets(scans)) == count
+    assert len(find_targets([scans]).tracks) == count
 
 
 def test_what_is_seen_twice_is_no_target():
     scans = scans_of(lambda s: [(10, 0, 0)] if s < 0.15 else [], lambda s: [1.0] if s < 0.15 else [])
-    assert moving_targets(scans) == ()
+    assert find_targets([scans]).tracks == ()
 
 
 def test_clusters_reach_as_far_as_the_radars_noise():
@@ -65,7 +65,7 @@ def test_clusters_reach_as_far_as_the_radars_noise():
         return [(40 + s, 1.0, 0), (40 + s, 3.0, 0)]
 
     coarse, fine = (
-        len(moving_targets(scans_of(points, lambda s: [1.0, 1.0]), TargetOptions(sigma_azimuth_deg=sigma)))
+        len(find_targets([scans_of(points, lambda s: [1.0, 1.0])], TargetOptions(sigma_azimuth_deg=sigma)).tracks)
         for sigma in (2.0, 0.1)
     )
     assert (coarse, fine) == (1, 2)
@@ -73,7 +73,7 @@ def test_clusters_reach_as_far_as_the_radars_noise():
 
 def test_people_are_followed_without_being_mixed_up():
     scene = street(people=3, seconds=20.0)
-    assert purity(scene, moving_targets(scene.scans)) > 0.95
+    assert purity(scene, find_targets([scene.scans]).tracks) > 0.95
 
 
 def test_from_moving_sensors_only_what_moves_over_ground_is_found():
@@ -117,7 +117,7 @@ def test_without_doppler_targets_are_what_travels():
 def test_without_doppler_moving_sensors_cannot_be_told_from_moving_targets():
     scene = street(people=1, seconds=2.0, with_doppler=False)
     with pytest.raises(InputError, match="no Doppler speeds"):
-        moving_targets(scene.scans, TargetOptions(sensors="moving"))
+        find_targets([scene.scans], TargetOptions(sensors="moving"))
 
 
 def test_pieces_of_a_recording_give_the_same_targets_as_the_whole():
@@ -129,7 +129,7 @@ def test_pieces_of_a_recording_give_the_same_targets_as_the_whole():
     found = find_targets(pieces, progress=lambda done, total: told.append((done, total)))
 
     assert [target.rows.tolist() for target in found.tracks] == [
-        target.rows.tolist() for target in moving_targets(whole)
+        target.rows.tolist() for target in find_targets([whole]).tracks
     ]
     assert told[0] == (0, 100)
 
@@ -137,12 +137,12 @@ def test_pieces_of_a_recording_give_the_same_targets_as_the_whole():
 def test_of_alternative_positions_of_one_return_the_first_counts():
     scans = scans_of(lambda s: [(10 + s, 0, 0), (10 + s, 6, 0)], lambda s: [1.0, 1.0])
     doubled = dataclasses.replace(scans, alternative_of=np.zeros(60, dtype=np.int64))
-    (target,) = moving_targets(doubled)
+    (target,) = find_targets([doubled]).tracks
     assert set((target.rows % 2).tolist()) == {0}
 
 
 def test_positions_that_are_not_numbers_are_left_out():
     scans = scans_of(lambda s: [(10 + s, 0, 0), (np.nan, 0, 0)], lambda s: [1.0, 1.0])
-    (target,) = moving_targets(scans)
+    (target,) = find_targets([scans]).tracks
     assert len(target.rows) == 30
-    assert moving_targets(RadarScans()) == ()
+    assert find_targets([RadarScans()]).tracks == ()

@@ -12,7 +12,7 @@ from calib_core.camera import Camera
 from calib_core.evaluation.figures import ResidualFigures, edges_of, spreads
 from calib_core.evaluation.paired_difference import acc_difference, residual_difference
 from calib_core.evaluation.residuals import associated_pairs, held_out, residual_figures, residual_test
-from calib_core.evaluation.target_tracking import moving_targets
+from calib_core.evaluation.target_tracking import find_targets
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Pair, TimeNs
 from calib_core.options import CalibrationOptions
@@ -282,7 +282,7 @@ def test_equal_calibrations_are_equal():
 @pytest.mark.slow
 def test_acc_is_compared_frame_by_frame():
     scene = street(people=2, seconds=30.0)
-    targets = moving_targets(scene.scans)
+    targets = find_targets([scene.scans]).tracks
     right, slightly, wrong = (
         box_figures(turned(TRUE_POSE, 1, angle), CAMERA, scene.scans, scene.boxes, targets=targets)
         for angle in (0.0, 0.05, 3.0)

@@ -39,8 +39,7 @@ class Search:
 
     def __init__(self) -> None:
         self.allowed = threading.Semaphore(0)
-        self.known: list[tuple[BoardCorners, ...]] = []
-        self.searched: list[tuple[int, ...]] = []
+        self.known: list[SearchProgress | None] = []
         self.end: Any = None
         self.error: Exception | None = None
 
@@ -51,13 +50,11 @@ class Search:
         model: object,
         *,
         known: Any,
-        searched: Any,
         progress: Any,
         stopped: Any,
     ) -> Any:
         self.known.append(known)
-        self.searched.append(searched)
-        views = list(known)
+        views = list(known.views) if known else []
         for index in range(len(images)):
             assert self.allowed.acquire(timeout=20)
             if self.error is not None:
@@ -148,8 +145,9 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
     watched.job.start(Images(), board, "auto")
     search.allowed.release(8)
     watched.until("done")
-    assert [one.index for one in search.known[1]] == ([0, 1, 2, 3] if is_same else [])
-    assert search.searched[1] == ((0, 1, 2, 3) if is_same else ())
+    known = search.known[1] or SearchProgress(0, 0)
+    assert [one.index for one in known.views] == ([0, 1, 2, 3] if is_same else [])
+    assert known.indices == ((0, 1, 2, 3) if is_same else ())
 
 
 def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, tmp_path):
