@@ -13,7 +13,7 @@ from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReflectorC
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import ramp_colours
-from cocalib.evaluation.evaluating import check_clicks, evaluate_recording
+from cocalib.evaluation.evaluating import check_clicks, evidence_in, judged
 
 ReturnQuantity: TypeAlias = Literal["range", "speed"]
 
@@ -241,9 +241,8 @@ def recorded_view(
     pairs = check_clicks(recording, clicks, calibration, calibration.options) if clicks else ()
     evaluation = None
     if clicks or boxes:
-        evaluation = evaluate_recording(
-            calibration, recording, clicks=clicks, boxes=boxes, held_out=False, progress=progress
-        )
+        evidence = evidence_in(recording, calibration.camera, clicks=clicks, boxes=boxes, progress=progress)
+        evaluation = judged(calibration, evidence, held_out=False, progress=progress)
     return RecordedView(
         recording,
         calibration,

@@ -21,8 +21,8 @@ from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration, Metrics
 from calib_core.results.metrics import distances
 from calib_core.results.verdict import verdict_on
+from cocalib.evaluation import evaluating
 from cocalib.evaluation.boxes import find_boxes
-from cocalib.evaluation.evaluating import evaluate_recording
 from cocalib.session.state import Outcome
 from cocalib.solving.automatic import place_clicks, solve_placed_clicks
 from cocalib.solving.solving import required_camera, solve_clicks
@@ -187,7 +187,7 @@ def _judged_boxes(boxes: Path, recording: Recording, camera: Camera, published: 
     drawn = find_boxes(str(boxes), recording)
     unknown = np.full((6, 6), np.nan)
     stated = Calibration(published, unknown, camera, Metrics(), (), (), (), CalibrationOptions())
-    figures = evaluate_recording(stated, recording, boxes=drawn).boxes
+    figures = evaluating.judged(stated, evaluating.evidence_in(recording, camera, boxes=drawn)).boxes
     counted = None if figures is None else figures.returns
     if counted is None:
         return Judged(verdict="no returns in boxes")

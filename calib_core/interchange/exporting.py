@@ -121,7 +121,7 @@ def export_all(
     for known in written_formats():
         parent = parent_from_radar if known.write_in_parent else None
         try:
-            made = export(
+            written[known.name] = export(
                 file,
                 known.name,
                 parent_from_radar=parent,
@@ -130,13 +130,6 @@ def export_all(
             )
         except InputError as error:
             refused.append(NotExported(known.name, str(error)))
-            continue
-        if made.file_name in {other.file_name for other in written.values()}:
-            refused.append(
-                NotExported(known.name, f"its file {made.file_name} is that of another format; export it alone")
-            )
-        else:
-            written[known.name] = made
     return written, tuple(refused)
 
 
@@ -304,10 +297,8 @@ def contents_text(written: Export) -> str:
     if content.startswith(b"PK"):
         members = unpack(content, source=written.file_name)
         return "\n".join(f"[{name}]\n{data.decode('utf-8', errors='replace')}" for name, data in members.items())
-    if content.startswith(b"MATLAB"):
-        comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
-        return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
-    return f"binary, {len(content):,} bytes\n"  # a format of an installed package, with an unknown layout
+    comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
+    return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
 
 
 def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:

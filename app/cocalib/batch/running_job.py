@@ -32,7 +32,7 @@ from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun, Status, S
 from cocalib.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, listed_files
 from cocalib.batch.solving import CALIBRATION_FILE, SolvedSession, given_files, solve_session
 from cocalib.evaluation.boxes import find_boxes
-from cocalib.evaluation.evaluating import EvidenceOptions, evaluate_recording, evaluation_exit_code
+from cocalib.evaluation.evaluating import evaluation_exit_code, evidence_in, judged
 from cocalib.evaluation.recording_check import judged_calibration, other_camera
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
@@ -341,12 +341,11 @@ def judge_session(row: ManifestRow, solved: SolvedSession, recording: Recording)
     Raises:
         CalibrationError: the boxes cannot be read, or are of another recording.
     """
-    judged = judged_calibration(solved.found, Path(CALIBRATION_FILE), recording)
+    known = judged_calibration(solved.found, Path(CALIBRATION_FILE), recording)
     boxes = None if row.boxes is None else find_boxes(str(row.boxes), recording)
-    evaluation = evaluate_recording(
-        judged.calibration, recording, clicks=solved.clicks, boxes=boxes, options=EvidenceOptions()
-    )
-    told = dataclasses.replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
+    evidence = evidence_in(recording, known.calibration.camera, clicks=solved.clicks, boxes=boxes)
+    evaluation = judged(known.calibration, evidence)
+    told = dataclasses.replace(evaluation, warnings=(*known.warnings, *evaluation.warnings))
     names = [path.name for path in row.recording]
     code = evaluation_exit_code(told)
     text = evaluation_json(told, calibration=CALIBRATION_FILE, recording=names, exit_code=code)

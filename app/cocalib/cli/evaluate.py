@@ -143,19 +143,14 @@ class Evaluate:
         options: "EvidenceOptions",
     ) -> "Evaluation":
         """Judge a calibration by clicks and boxes, and show how far it is."""
-        from cocalib.evaluation.evaluating import evaluate_recording
+        from cocalib.evaluation.evaluating import evidence_in, judged
 
+        camera = calibration.camera
         with progress_bar("evaluating") as progress:
-            return evaluate_recording(
-                calibration,
-                recording,
-                clicks=clicks,
-                boxes=boxes,
-                labels=labels,
-                held_out=not self.no_held_out,
-                progress=progress,
-                options=options,
+            evidence = evidence_in(
+                recording, camera, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
             )
+            return judged(calibration, evidence, held_out=not self.no_held_out, progress=progress)
 
     def _report(self) -> int:
         """Write the report; return the exit code."""

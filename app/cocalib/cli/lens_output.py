@@ -12,6 +12,7 @@ from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.coverage import BoardSearch, Coverage
 from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_uncertainty, residual_field
 from calib_core.intrinsics.split_difference import split_difference
+from calib_core.recordings import aligned
 from calib_core.words.intrinsics import halves_text, residuals_text
 from calib_core.words.outcomes import in_sentences
 from cocalib.intrinsics.field_of_view import field_of_view_text
@@ -97,13 +98,11 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
 
 
 def _view_lines(lens: CalibratedLens) -> Iterator[str]:
-    width = max(len(view.corners.name) for view in lens.views)
-    yield f"{'view':<{width}}  corners  used  RMS px  leave-one-out px"
+    rows = [("view", "corners", "used", "RMS px", "leave-one-out px")]
     for view in lens.views:
-        used = int(view.used.sum())
-        yield (
-            f"{view.corners.name:<{width}}  {len(view.used):7d}  {used:4d}  {view.rms_px:6.3f}  {view.held_out_rms_px:11.3f}"
-        )
+        used, corners = int(view.used.sum()), len(view.used)
+        rows.append((view.corners.name, f"{corners}", f"{used}", f"{view.rms_px:.3f}", f"{view.held_out_rms_px:.3f}"))
+    yield from aligned(rows, right=range(1, 5))
 
 
 def convert_camera(path: Path, *, to: str | None, out: Path | None, size_px: tuple[int, int] | None) -> int:

@@ -76,38 +76,6 @@ class Evidence:
     warnings: tuple[DataWarning, ...]
 
 
-def evaluate_recording(
-    calibration: Calibration,
-    recording: RadarRecording,
-    *,
-    clicks: Sequence[ReflectorClick] = (),
-    boxes: Boxes | None = None,
-    labels: ReturnLabels | None = None,
-    held_out: bool = True,
-    progress: Callable[[int, int], None] | None = None,
-    options: EvidenceOptions | None = None,
-) -> Evaluation:
-    """Judge a calibration on a recording; no image is decoded.
-
-    Args:
-        calibration: in whatever way it was made.
-        recording: with a radar.
-        clicks: on the reflector, in this recording.
-        boxes: around moving objects, in this recording.
-        labels: the true origin of each return, of a simulation; they then decide instead of the radar's own targets.
-        held_out: also predict the clicks of each placement from the others.
-        progress: called with the amount done and the total, of one step after the other.
-        options: of the search; None takes the defaults.
-
-    Raises:
-        InputError: boxes or labels are of another recording or another camera, or no class matches.
-    """
-    evidence = evidence_in(
-        recording, calibration.camera, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
-    )
-    return judged(calibration, evidence, held_out=held_out, progress=progress)
-
-
 def evidence_in(
     recording: RadarRecording,
     camera: Camera,
@@ -118,14 +86,14 @@ def evidence_in(
     progress: Callable[[int, int], None] | None = None,
     options: EvidenceOptions | None = None,
 ) -> Evidence:
-    """Find what speaks for or against calibrations in a recording; the pose of none of them has a say in it.
+    """Find what speaks for or against calibrations in a recording; the pose of none has a say in it, and no image is decoded.
 
     Args:
         recording: with a radar.
         camera: the lens.
         clicks: on the reflector.
         boxes: around moving objects.
-        labels: the true origin of each return.
+        labels: the true origin of each return, of a simulation; they then decide instead of the radar's own targets.
         progress: called with the scans done and their number.
         options: of the search; None takes the defaults.
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.evaluation.target_tracking import moving_targets
+from calib_core.evaluation.target_tracking import find_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.check.agreement import compare
@@ -16,7 +16,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.evaluation.evaluating import evaluate_recording
+from cocalib.evaluation.evaluating import evidence_in, judged
 from cocalib.session.applying import History
 from cocalib.session.state import RecordingFacts, Session
 from cocalib.solving.solving import solve_clicks
@@ -46,12 +46,12 @@ def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClic
 
 @pytest.mark.slow
 def test_the_residuals_on_the_page_are_those_of_evaluate(recording, clicks, solved):
-    judged = evaluate_recording(solved, recording, clicks=clicks).residuals
-    page, metrics = figures_of(shown(solved, recording, clicks, None).metrics), judged.metrics
+    figures = judged(solved, evidence_in(recording, solved.camera, clicks=clicks)).residuals
+    page, metrics = figures_of(shown(solved, recording, clicks, None).metrics), figures.metrics
     for key, value in {"aed": metrics.aed_px, "cdsd": metrics.cdsd_px, "rms": metrics.rms_px}.items():
         assert page[key] == plain(value)
     assert page["held_out_aed"] == plain(metrics.held_out_aed_px)
-    assert page["inliers"] == f"{judged.inliers.sum()} of {len(judged.ids)}"
+    assert page["inliers"] == f"{figures.inliers.sum()} of {len(figures.ids)}"
     assert metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
 
 
@@ -70,16 +70,16 @@ def test_the_comparison_on_the_page_is_that_of_check(recording, clicks, solved):
 
 
 def test_acc_on_the_page_is_that_of_the_core():
-    walk, reference = StreetRecording(), reference_calibration()
-    evaluation = evaluate_recording(reference.calibration, walk, boxes=walk.street.boxes, held_out=False)
+    walk, calibration = StreetRecording(), reference_calibration().calibration
+    evaluation = judged(calibration, evidence_in(walk, calibration.camera, boxes=walk.street.boxes), held_out=False)
     of_one = acc_panel(evaluation)
     assert (of_one.sensitivity, of_one.caution[:10]) == ((), "Too little")
     assert evaluation.boxes is not None
     panel = acc_panel(replace(evaluation, boxes=replace(evaluation.boxes, matched_targets=3)))
     assert panel.figures[0] == of_one.figures[0]
-    found = moving_targets(walk.street.scans)
+    found = find_targets([walk.street.scans]).tracks
     core = box_figures(
-        reference.calibration.camera_from_radar, walk.camera(), walk.street.scans, walk.street.boxes, targets=found
+        calibration.camera_from_radar, walk.camera(), walk.street.scans, walk.street.boxes, targets=found
     )
     assert core.acc is not None
     assert figures_of(panel.figures)["acc"].split(" ±")[0] == f"{100 * core.acc:.1f}"

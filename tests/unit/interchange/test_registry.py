@@ -9,7 +9,6 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, choose_check_point
 from calib_core.interchange.exporting import export, export_all
-from calib_core.interchange.formats import registry
 from calib_core.interchange.formats.registry import FORMATS, format_named, readers, written_formats
 from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
@@ -102,13 +101,3 @@ def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3, rectified)
         with pytest.raises(InputError) as alone:
             export(with_k3, one.name, rectified=rectified and format_named(one.name).is_for_rectified)
         assert one.reason == str(alone.value)
-
-
-def test_two_formats_do_not_write_one_file(with_k3, monkeypatch):
-    twin = replace(format_named("matrix"), name="matrix-twin")
-    monkeypatch.setattr(registry, "FORMATS", (*FORMATS, twin))
-
-    written, refused = export_all(with_k3)
-
-    assert "matrix" in written
-    assert [one.name for one in refused if "of another format" in one.reason] == ["matrix-twin"]
