@@ -47,6 +47,19 @@
       const [preview, answer] = await Promise.all([since(() => state.view.checking || solved()), since(solved)]);
       return { mark, preview, answer };
     },
+    /** Open the page Check: until its grid is drawn, and until the cut-outs in sight are. */
+    async sheet() {
+      const start = performance.now();
+      const cells = document.getElementsByClassName("crop");
+      const images = () => [...cells].slice(0, 8).map((cell) => cell.querySelector("img"));
+      document.getElementById("tab-check").click();
+      await until(() => cells.length === state.view.clicks.length);
+      await painted();
+      const grid = performance.now() - start;
+      await until(() => images().every((image) => image && image.complete && image.naturalWidth));
+      await painted();
+      return { grid, cutOuts: performance.now() - start };
+    },
     /** Step one frame forward; from the last one to the first. */
     async step() {
       const target = (state.cursor + 1) % state.seconds.length;

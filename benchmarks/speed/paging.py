@@ -1,5 +1,6 @@
 """The page in a real Chromium against an earlier version of it, in turn: `python -m benchmarks.speed.paging`; playing, memory."""
 
+import json
 import os
 import re
 import subprocess
@@ -19,6 +20,8 @@ from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.speed.rows import Row, Table, median_ms, section
 from benchmarks.speed.starting import as_installed
+from calib_core.measurements import time_from_parts
+from calib_core.recordings import open_recording
 from calib_core.synthetic.files import write_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
@@ -42,9 +45,12 @@ _FLAGS = [
 _HERE = Path(__file__).resolve().parents[2]
 _EARLIER = "c35a642"
 """The commit to compare with: the last one before answers came in two steps, and before there were proposals."""
+_EARLIER_SHEET = "ac111f5b"
+"""The same for the contact sheet: the last one that got its cut-outs one by one."""
 _ROUNDS = 4
 _CLICKS = 20
 _STEPS = 40
+_MARKS_EACH = 10
 _PLAY_S = 20.0
 _SAMPLE = [str(sample_folder() / "rooftop" / name) for name in ("radar.bag", "camera.bag")]
 _MEASURES = Path(__file__).with_name("measures.js")
@@ -77,17 +83,62 @@ def measure_page(scratch: Path) -> tuple[Table, ...]:
         simulate(SimulationOptions(placements=2, dwell_s=4.0, width_px=1920, height_px=1080, camera_rate_hz=30.0)),
         scratch / "large",
     )
-    compared, beginning = _compared(scratch), _beginning(scratch)
+    compared, sheet, beginning = _compared(scratch), measure_sheet(scratch), _beginning(scratch)
     with _opened(_HERE, ["open", *map(str, large)], scratch, "playing") as opened:
-        return compared, beginning, _playing(opened)
+        return compared, sheet, beginning, _playing(opened)
+
+
+def _earlier(commit: str, scratch: Path) -> Path:
+    archive = subprocess.run(["git", "-C", str(_HERE), "archive", commit], check=True, capture_output=True).stdout
+    with tarfile.open(fileobj=BytesIO(archive)) as files:
+        files.extractall(scratch / commit, filter="data")
+    return scratch / commit
+
+
+def measure_sheet(scratch: Path) -> Table:
+    """Open the contact sheet of 200 marks in both versions, one after the other; cut-outs are kept from the opening before."""
+    file = sample_folder() / "rooftop" / "clicks.json"
+    document = json.loads(file.read_text())
+    with open_recording([Path(path) for path in _SAMPLE]) as recording:
+        times = recording.image_times
+    marks = []
+    for click in document["clicks"]:
+        at = int(np.searchsorted(times, time_from_parts(**click["image_time"])))
+        for index in range(at - _MARKS_EACH // 2, at + _MARKS_EACH // 2):
+            sec, nanosec = divmod(int(times[index]), 10**9)
+            marks.append({**click, "id": f"c{len(marks)}", "image_time": {"sec": sec, "nanosec": nanosec}})
+    many = scratch / "many.json"
+    many.write_text(json.dumps({**document, "clicks": marks}))
+    times_ms: dict[Path, dict[str, list[float]]] = {_earlier(_EARLIER_SHEET, scratch): {}, _HERE: {}}
+    for number in range(_ROUNDS):
+        for version, measured in times_ms.items():
+            command = ["open", *_SAMPLE, "--clicks", str(many)] if number == 0 else ["open", *_SAMPLE]
+            with _opened(version, command, scratch, f"sheet-{version.name}") as opened:
+                if number == 0:  # here the cut-outs are made
+                    opened.page.wait_for_timeout(10_000)
+                    continue
+                for what, value_ms in opened.page.evaluate("() => window.__measures.sheet()").items():
+                    measured.setdefault(what, []).append(value_ms)
+    return Table(
+        "The contact sheet",
+        f"{len(marks)} marks of the sample and their cut-outs of the session before, with the 3D view next to the image; the "
+        f"page Check is opened once in each of {_ROUNDS - 1} sessions of this version and of {_EARLIER_SHEET}, in turn. Alone: "
+        "`python -m benchmarks.speed.paging --sheet`.",
+        (
+            _against("opening Check to its grid with numbers", *(times["grid"] for times in times_ms.values())),
+            _against("opening Check to the cut-outs in sight", *(times["cutOuts"] for times in times_ms.values())),
+        ),
+    )
+
+
+def _against(what: str, before_ms: list[float], now_ms: list[float]) -> Row:
+    median = float(np.median(now_ms))
+    return Row(what, median_ms(now_ms), f"{median / np.median(before_ms):.2f} x", "under 300 ms", median < 300)
 
 
 def _compared(scratch: Path) -> Table:
     """Drag the same marks and step through the same frames in both versions, one after the other."""
-    earlier = scratch / "earlier"
-    archive = subprocess.run(["git", "-C", str(_HERE), "archive", _EARLIER], check=True, capture_output=True).stdout
-    with tarfile.open(fileobj=BytesIO(archive)) as files:
-        files.extractall(earlier, filter="data")
+    earlier = _earlier(_EARLIER, scratch)
     command = ["open", *_SAMPLE, "--clicks", str(sample_folder() / "rooftop" / "clicks.json")]
     times_ms: dict[Path, dict[str, list[float]]] = {earlier: {}, _HERE: {}}
     for number in range(_ROUNDS):
@@ -215,5 +266,6 @@ def _tab_megabytes() -> float:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        for table in measure_page(Path(folder)):
+        tables = (measure_sheet(Path(folder)),) if "--sheet" in sys.argv else measure_page(Path(folder))
+        for table in tables:
             print("\n".join(section(table)))

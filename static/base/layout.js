@@ -33,7 +33,7 @@ export function startLayout() {
   takeShape();
   startDivider("divider-x", followX);
   startDivider("divider-y", followY);
-  on(["box"], tellDividers);
+  on(["box"], () => requestAnimationFrame(() => setTimeout(tellDividers))); // then the layout is done
   for (const bar of dividers()) for (const type of ["keyup", "pointerup", "focus"]) bar.addEventListener(type, tellDividers);
   for (const tab of tabs()) tab.onclick = () => showPage(nameOf(tab));
   element("menu").addEventListener("click", () => element("menu").hidePopover());
@@ -95,7 +95,6 @@ function takeShape() {
   root.dataset.shape = wide ? "wide" : innerHeight > innerWidth ? "tall" : "low";
   element("divider-x").setAttribute("aria-orientation", root.dataset.shape === "tall" ? "horizontal" : "vertical");
   element("divider-x").setAttribute("aria-label", root.dataset.shape === "tall" ? "Height of the image" : "Width of the image");
-  tellDividers();
   emit("box");
 }
 
@@ -111,7 +110,6 @@ function showPane(pane) {
   root.dataset.pane = pane;
   for (const button of paneButtons()) button.setAttribute("aria-pressed", String(button.dataset.pane === pane));
   keep({ pane });
-  tellDividers();
   emit("box");
 }
 

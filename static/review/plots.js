@@ -45,6 +45,11 @@ export class Plot {
     this.canvas.addEventListener("pointerleave", () => this.leave());
     this.canvas.addEventListener("keydown", (event) => this.typed(event));
     this.canvas.addEventListener("blur", () => this.listener.hover(null));
+    /** Of the plot, which its canvas's box gives: in CSS px, or in larger ones on a 4K monitor. @type {[number, number]} */ this.size = [0, 0];
+    new ResizeObserver(([{ contentRect }]) => {
+      this.size = [contentRect.width / growth(), contentRect.height / growth()];
+      this.draw();
+    }).observe(this.canvas);
   }
 
   /** @param {Content} content @param {Highlight} highlight */
@@ -55,11 +60,6 @@ export class Plot {
     this.canvas.setAttribute("aria-label", `${this.title}: ${count} clicks. Arrow keys move from mark to mark, Enter goes to its frame.`);
     if (this.at >= content.marks.length) this.at = -1;
     this.draw();
-  }
-
-  /** Size of the plot, which the canvas's box gives: in CSS px, or in larger ones on a 4K monitor. @returns {[number, number]} */
-  get size() {
-    return [this.canvas.clientWidth / growth(), this.canvas.clientHeight / growth()];
   }
 
   /** Data to px of the plot, kept on the plot. @param {number} x @param {number} y @returns {[number, number]} */

@@ -81,8 +81,6 @@ export function startReview() {
   check.prepend(overview);
   page.append(filters, grid, readout, why);
   drawFilters();
-  const observer = new ResizeObserver(() => visible() && redraw());
-  for (const plot of plots.values()) observer.observe(plot.canvas);
   on(["view", "selected", "theme", "recording"], refresh);
   on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the image is moved
   on(["connection"], () => {
@@ -130,7 +128,7 @@ function drawAll() {
   drawFilters();
   drawPlots();
   drawPair();
-  drawMarks(); // last: the plots ask for their size, and a layout of all cut-outs takes its time
+  drawMarks();
 }
 
 /** The marks above the line. */

@@ -3,6 +3,7 @@
  * Enter goes to the mark, X leaves it out or takes it in again, R says that it was looked at.
  */
 
+import { ask, content } from "../base/asking.js";
 import { make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { nameOf, stampOf, state } from "../base/state.js";
@@ -17,6 +18,11 @@ const cells = new Map();
 /** @type {(id: string) => void} */
 let arrive = () => {};
 const sheet = make("div", "sheet", []);
+/** So many are asked for at a time. */
+const BATCH = 12;
+/** The arrows of cells that were never near the part in sight. @type {WeakMap<Element, () => Element>} */
+const arrows = new WeakMap();
+const observer = new IntersectionObserver(complete, { root: document.getElementById("page-check"), rootMargin: "60px 0px" });
 
 /** @param {(id: string) => void} go Goes to a click. */
 export function contactSheet(go) {
@@ -77,23 +83,49 @@ function mark(cell, { hovered, brushed, selected }) {
 function fill(cell, { click, kind, right, down, length }, isReviewed) {
   const side = Math.min(MOST, SIDE * 2 ** Math.max(0, Math.ceil(Math.log2((WIDER * length) / SIDE))));
   const { sec, nanosec } = stampOf(click.frame);
-  const source = `api/crop.jpg?time=${sec}${String(nanosec).padStart(9, "0")}&u=${click.u_px.toFixed(2)}&v=${click.v_px.toFixed(2)}&side=${side}`;
+  const source = `${sec}${String(nanosec).padStart(9, "0")},${click.u_px.toFixed(2)},${click.v_px.toFixed(2)},${side}`;
   const words = `${nameOf(click.id)}: ${length.toFixed(1)} px${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;
   const drawn = `${source} ${right.toFixed(1)} ${down.toFixed(1)} ${words}`;
   if (cell.dataset.drawn === drawn) return;
   cell.className = `crop ${kind}${isReviewed ? " reviewed" : ""}`;
-  Object.assign(cell.dataset, { id: click.id, drawn, roves: KEYS });
+  Object.assign(cell.dataset, { id: click.id, drawn, source, roves: KEYS });
   cell.setAttribute("aria-label", words);
   cell.onclick = () => arrive(click.id);
-  let image = cell.querySelector("img");
-  if (image?.getAttribute("src") !== source) {
-    image = make("img", "", []);
-    Object.assign(image, { loading: "lazy", width: SIDE, height: SIDE, alt: "", src: source });
-  }
-  const arrow = shape("svg", { viewBox: `${-side / 2} ${-side / 2} ${side} ${side}`, "aria-hidden": "true" });
+  const image = cell.querySelector("img");
+  cell.replaceChildren(...(image ? [image, arrow(side, right, down)] : []), make("span", "", [make("b", "", nameOf(click.id)), ` ${length.toFixed(1)} px${isReviewed ? " ✓" : ""}`]));
+  if (image?.dataset.source === source) return;
+  arrows.set(cell, () => arrow(side, right, down));
+  observer.observe(cell);
+}
+
+/** Get the cut-outs that are near the part in sight. @param {IntersectionObserverEntry[]} entries */
+function complete(entries) {
+  const near = entries.filter((entry) => entry.isIntersecting).map((entry) => /** @type {HTMLElement} */ (entry.target));
+  for (const cell of near) observer.unobserve(cell);
+  for (let first = 0; first < near.length; first += BATCH) getCutOuts(near.slice(first, first + BATCH));
+}
+
+/** @param {HTMLElement[]} of */
+async function getCutOuts(of) {
+  const sources = of.map((cell) => String(cell.dataset.source));
+  const images = of.map((cell, index) => {
+    const image = cell.querySelector("img") ?? Object.assign(make("img", "", []), { width: SIDE, height: SIDE, alt: "" });
+    if (!image.parentElement) cell.prepend(image, .../** @type {Element[]} */ ([arrows.get(cell)?.()].filter(Boolean)));
+    image.dataset.source = sources[index];
+    return image;
+  });
+  const { answer } = await ask(`api/crops.json?${sources.join(";")}`);
+  /** @type {(string|null)[]} */
+  const made = (answer && (await content(answer.json()))) ?? [];
+  for (const [index, image] of images.entries()) if (made[index] && image.dataset.source === sources[index]) image.src = `data:image/jpeg;base64,${made[index]}`;
+}
+
+/** From the mark to its reprojection. @param {number} side @param {number} right @param {number} down px of the image */
+function arrow(side, right, down) {
+  const drawn = shape("svg", { viewBox: `${-side / 2} ${-side / 2} ${side} ${side}`, "aria-hidden": "true" });
   const ring = 0.05 * side;
-  for (const name of ["rim", "residual"]) arrow.append(shape("path", { class: name, d: `M0 0L${right} ${down}M${right + ring} ${down}a${ring} ${ring} 0 1 0 ${-2 * ring} 0a${ring} ${ring} 0 1 0 ${2 * ring} 0` }));
-  cell.replaceChildren(image, arrow, make("span", "", [make("b", "", nameOf(click.id)), ` ${length.toFixed(1)} px${isReviewed ? " ✓" : ""}`]));
+  for (const name of ["rim", "residual"]) drawn.append(shape("path", { class: name, d: `M0 0L${right} ${down}M${right + ring} ${down}a${ring} ${ring} 0 1 0 ${-2 * ring} 0a${ring} ${ring} 0 1 0 ${2 * ring} 0` }));
+  return drawn;
 }
 
 /** One cut-out can be reached by Tab. @param {HTMLElement|undefined} current */

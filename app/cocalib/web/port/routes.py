@@ -71,8 +71,9 @@ _LANDING = (
     b'<!doctype html><meta charset="utf-8"><title>cocalib</title><link rel="icon" href="/icon.svg">'
     b'<p><a href="/">Open the page</a>'
 )
-_PAGE, _CROPS = "index.html", "/api/crop.jpg"
-_CROP = re.compile(r"time=([0-9]{1,19})&u=(-?[0-9]{1,5}(?:\.[0-9]+)?)&v=(-?[0-9]{1,5}(?:\.[0-9]+)?)&side=([0-9]{1,3})")
+_PAGE, _CROPS = "index.html", "/api/crops.json"
+_CROP = re.compile(r"([0-9]{1,19}),(-?[0-9]{1,5}(?:\.[0-9]+)?),(-?[0-9]{1,5}(?:\.[0-9]+)?),([0-9]{1,3})")
+_CROPS_AT_ONCE = 12
 _INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 _IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["'](\.\.?/[a-z0-9_./]+\.js)["']""", re.MULTILINE)
@@ -206,7 +207,7 @@ class _Downloads:
             "/api/board_corners.json": self._board_corners,
             "/api/image_changes.json": self._image_changes,
             "/api/check_point_image": self._check_point_image,
-            _CROPS: self._crop,
+            _CROPS: self._cut_outs,
             "/api/meanings.json": self._meanings,
             "/api/meaning.jpg": self._meaning,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
@@ -274,18 +275,18 @@ class _Downloads:
 
         return self._of_calibration(make)
 
-    def _crop(self, query: str) -> Reply:
-        """Return the cut-out of a mark: `time=NANOSECONDS&u=COLUMN&v=ROW&side=PIXELS`."""
-        match = _CROP.fullmatch(query)
-        if match is None:
-            return refusal(400, "Name the frame's stamp, the pixel and the side.")
+    def _cut_outs(self, query: str) -> Reply:
+        """Return cut-outs of marks in base 64, null for what cannot be cut: `NANOSECONDS,COLUMN,ROW,SIDE;…`."""
+        matches = [_CROP.fullmatch(key) for key in query.split(";", _CROPS_AT_ONCE - 1)]
+        if None in matches:
+            return refusal(400, f"Name stamp, pixel and side of at most {_CROPS_AT_ONCE} marks.")
+        return json_reply(msgspec.json.encode([self._cut_out(match) for match in matches if match]))
+
+    def _cut_out(self, match: re.Match[str]) -> bytes | None:
         try:
-            made = self.crops.get((int(match[1]), float(match[2]), float(match[3]), int(match[4])))
-        except KeyError:
-            return refusal(404, "No image has this stamp.")
-        except ValueError as error:
-            return refusal(404, str(error))
-        return _reply(made, "image/jpeg", more=(("Cache-Control", "private, max-age=604800, immutable"),))
+            return self.crops.get((int(match[1]), float(match[2]), float(match[3]), int(match[4])))
+        except (KeyError, ValueError):  # no image has this stamp, or it cannot be decoded
+            return None
 
     def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
         """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""

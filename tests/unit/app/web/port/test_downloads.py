@@ -1,6 +1,7 @@
 """Downloads of a calibration: what the port returns and what it refuses."""
 
 import asyncio
+import base64
 import dataclasses
 import json
 import threading
@@ -179,14 +180,15 @@ def test_the_cut_out_of_a_mark_is_centred_on_it_and_small_however_long_the_resid
     recording = ImageRecording([image])
     stamp = int(recording.image_times[0])
     for side in (96, 300):
-        reply = ask(Session(), f"/api/crop.jpg?time={stamp}&u=300.00&v=200.00&side={side}", recording)
-        made = cv2.imdecode(np.frombuffer(reply.body, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
+        [cut_out] = json.loads(ask(Session(), f"/api/crops.json?{stamp},300.00,200.00,{side}", recording).body)
+        made = cv2.imdecode(np.frombuffer(base64.b64decode(cut_out), dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
         assert made.shape == (96, 96)
         brightest = np.unravel_index(int(np.argmax(made)), made.shape)
         np.testing.assert_allclose(brightest, 47.5, atol=2)
-    assert ask(Session(), f"/api/crop.jpg?time={stamp}&u=-5.0&v=399.9&side=96", recording).status == 200
-    assert ask(Session(), f"/api/crop.jpg?time={stamp + 1}&u=3&v=4&side=96", recording).status == 404
-    assert ask(Session(), f"/api/crop.jpg?time={stamp}&u=3&v=4&side=9999", recording).status == 400
+    reply = ask(Session(), f"/api/crops.json?{stamp},-5.0,399.9,96;{stamp + 1},3,4,96", recording)
+    assert [made is None for made in json.loads(reply.body)] == [False, True]
+    for refused in (f"{stamp},3,4,9999", "", ";".join([f"{stamp},3,4,96"] * 13)):
+        assert ask(Session(), f"/api/crops.json?{refused}", recording).status == 400
 
 
 def test_the_image_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, ask):
