@@ -51,7 +51,7 @@ class PossiblePose:
 _LEAST_PAIRS = 4  # three always agree
 # a ratio that outliers without a common pose reach in at most one set of 100, whatever their distribution (Markov)
 _LEAST_LOG_RATIO = float(np.log(100.0))
-_STARTS, _ROUNDS = 12, 15
+_STARTS, _ROUNDS = 12, 8
 """Number of starts, and of steps from each. A choice: a group of few is found more surely with more, which take longer."""
 _SHARE = 0.5  # of the outliers that may belong to the group
 _MOST_PAIRS = 150
@@ -115,9 +115,9 @@ def find_agreeing_outliers(
 def _starts(
     outliers: PairMeasurements, fitted: RigidTransform, rng: "np.random.Generator"
 ) -> tuple[RigidTransform, ...]:
-    """Return hypotheses from few pairs, as drawn and refined, and the fit: a companion's pose is often near it."""
+    """Return refined hypotheses from few pairs, and the fit: a companion's pose is often near it."""
     drawn = initial_poses(outliers, most=_STARTS, rng=rng)
-    return (fitted, *drawn, *(one.camera_from_radar for one in solve_gnc(outliers, drawn, estimate_scale=False)))
+    return (fitted, *(one.camera_from_radar for one in solve_gnc(outliers, drawn, estimate_scale=False)))
 
 
 def _log_ratios(modes: Modes, free: CameraPrior) -> Values:
