@@ -143,6 +143,10 @@ def _frozen_alternatives(alternative_of: Indices | None, n: int) -> Indices | No
     return None if alternative_of is None else frozen_array(alternative_of, (n,), dtype=np.int64)
 
 
+RETURN_COLUMNS = ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar")
+"""What is known of each return, beside its alternatives."""
+
+
 def _no_first_return() -> Indices:
     return np.zeros(1, dtype=np.int64)
 
@@ -191,11 +195,7 @@ class RadarScans:
         return cls(
             times_ns=np.array([scan.time for scan in ordered], dtype=np.int64),
             first_return=np.concatenate([[0], np.cumsum([len(scan) for scan in ordered])]),
-            points_radar_m=np.concatenate([scan.points_radar_m for scan in ordered]),
-            doppler_mps=np.concatenate([scan.doppler_mps for scan in ordered]),
-            snr_db=np.concatenate([scan.snr_db for scan in ordered]),
-            sigma_polar=np.concatenate([scan.sigma_polar for scan in ordered]),
-            alternative_of=_joined_alternatives(ordered),
+            **_joined_columns(ordered),
         )
 
     @classmethod
@@ -207,24 +207,13 @@ class RadarScans:
         return cls(
             times_ns=np.concatenate([piece.times_ns for piece in pieces]),
             first_return=np.concatenate([[0], np.cumsum(counts)]),
-            points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
-            doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
-            snr_db=np.concatenate([piece.snr_db for piece in pieces]),
-            sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
-            alternative_of=_joined_alternatives(pieces),
+            **_joined_columns(pieces),
         )
 
     def scan(self, index: int) -> RadarScan:
         """Return one scan by its index in time order."""
         rows = slice(int(self.first_return[index]), int(self.first_return[index + 1]))
-        return RadarScan(
-            time=TimeNs(int(self.times_ns[index])),
-            points_radar_m=self.points_radar_m[rows],
-            doppler_mps=self.doppler_mps[rows],
-            snr_db=self.snr_db[rows],
-            sigma_polar=self.sigma_polar[rows],
-            alternative_of=None if self.alternative_of is None else self.alternative_of[rows],
-        )
+        return RadarScan(time=TimeNs(int(self.times_ns[index])), **self._columns(rows))
 
     def nearest(self, time: TimeNs) -> int:
         """Find the scan with the nearest stamp; of two equally near, the earlier one.
@@ -263,28 +252,26 @@ class RadarScans:
             times_ns: (m,) of the scans.
             first_return: (m + 1,) into the rows.
         """
-        return RadarScans(
-            times_ns=times_ns,
-            first_return=first_return,
-            points_radar_m=self.points_radar_m[rows],
-            doppler_mps=self.doppler_mps[rows],
-            snr_db=self.snr_db[rows],
-            sigma_polar=self.sigma_polar[rows],
-            alternative_of=None if self.alternative_of is None else self.alternative_of[rows],
-        )
+        return RadarScans(times_ns=times_ns, first_return=first_return, **self._columns(rows))
+
+    def _columns(self, rows: Indices | slice) -> dict[str, Any]:
+        """Return the columns of some returns."""
+        alternatives = None if self.alternative_of is None else self.alternative_of[rows]
+        return {name: getattr(self, name)[rows] for name in RETURN_COLUMNS} | {"alternative_of": alternatives}
 
     def scan_of_return(self) -> Indices:
         """Return, for each row, the index of the scan that owns it: (n,)."""
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.first_return))
 
 
-def _joined_alternatives(pieces: "Sequence[RadarScan | RadarScans]") -> Indices | None:
-    """Concatenate the alternatives of scans; None if no return has any."""
-    given = [piece.alternative_of for piece in pieces]
-    if all(own is None for own in given):
-        return None
-    counts = [len(piece.points_radar_m) for piece in pieces]
-    return np.concatenate([np.full(n, -1) if own is None else own for own, n in zip(given, counts, strict=True)])
+def _joined_columns(pieces: "Sequence[RadarScan | RadarScans]") -> dict[str, Any]:
+    """Concatenate the columns of scans; no alternatives if no return has any."""
+    joined = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in RETURN_COLUMNS}
+    given = [(piece.alternative_of, len(piece.points_radar_m)) for piece in pieces]
+    if all(own is None for own, _ in given):
+        return joined
+    alternatives = np.concatenate([np.full(count, -1) if own is None else own for own, count in given])
+    return joined | {"alternative_of": alternatives}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

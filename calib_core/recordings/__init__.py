@@ -14,7 +14,7 @@ from calib_core.recordings.recording import (
     require_files,
 )
 from calib_core.recordings.selection import RecordingOptions, figures_text
-from calib_core.recordings.summary import RecordingSummary, aligned, clock_lines, describe, recording_summary
+from calib_core.recordings.summary import RecordingSummary, clock_lines, describe, recording_summary, table_lines
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
 from calib_core.recordings.verification import Verification, verification_text, verify_recording
@@ -34,7 +34,6 @@ __all__ = [
     "TopicSummary",
     "Verification",
     "WrittenVideo",
-    "aligned",
     "assumption_hint",
     "assumption_warnings",
     "begins_recording",
@@ -49,6 +48,7 @@ __all__ = [
     "recording_summary",
     "require_files",
     "size_of_images_beside",
+    "table_lines",
     "verification_text",
     "verify_recording",
     "video_format",

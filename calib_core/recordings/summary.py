@@ -343,7 +343,7 @@ def summary_text(summary: RecordingSummary) -> str:
     """Format a summary as text: one fact per line, numbers with units, warnings last."""
     lines = [
         *_labelled(
-            "files", aligned([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
+            "files", table_lines([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
         ),
         *_times(summary),
         "",
@@ -414,7 +414,7 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 _times_used(topic),
             )
         )
-    lines = list(aligned(rows, right={3, 4, 5, 6}))
+    lines = list(table_lines(rows, right={3, 4, 5, 6}))
     problems = [
         topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}"
         for topic in topics
@@ -506,7 +506,7 @@ def _sensors(summary: RecordingSummary) -> list[str]:
                 _topics_of(sensor),
             )
         )
-    return [*aligned(rows, right={3, 4, 5, 6}), summary.radar.choice]
+    return [*table_lines(rows, right={3, 4, 5, 6}), summary.radar.choice]
 
 
 def _topics_of(sensor: RadarSensor) -> str:
@@ -523,7 +523,7 @@ def _readings(radar: RadarSummary) -> list[str]:
         return []
     rows = [("quantity", "read from", "unit", "grows", "known by")]
     rows += [(column.quantity, column.column, column.unit, column.sign, column.why) for column in radar.columns]
-    return list(aligned(rows))
+    return list(table_lines(rows))
 
 
 def _camera_lines(camera: CameraSummary | None) -> list[str]:
@@ -563,7 +563,7 @@ def _intrinsics(camera: CameraSummary) -> str:
     )
 
 
-def aligned(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> Iterator[str]:
+def table_lines(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> Iterator[str]:
     """Yield the lines of a table.
 
     Args:

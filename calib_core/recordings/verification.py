@@ -17,7 +17,7 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.messages.foxglove import ros_message
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import LOSSES, Recording
-from calib_core.recordings.summary import FileSummary, aligned, files_of
+from calib_core.recordings.summary import FileSummary, files_of, table_lines
 from calib_core.words.outcomes import WarningText, warning_text
 
 _PROGRESS_MESSAGES = 200
@@ -236,7 +236,7 @@ def verification_text(verification: Verification) -> str:
     lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in verification.files]
     lines += [
         "",
-        *aligned(rows, right=range(1, 1 + len(_COUNTS))),
+        *table_lines(rows, right=range(1, 1 + len(_COUNTS))),
         *(f"  {one.topic}: {one.fault}" for one in verification.topics if one.fault),
         "",
     ]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from calib_core.recordings import aligned
+from calib_core.recordings import table_lines
 from cocalib.platform.terminal import terminal_stream
 from cocalib.view.wording import plain
 
@@ -31,7 +31,7 @@ def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
 def status_lines(table: "BatchResults") -> "Iterator[str]":
     """Return the table of results, and why there is no calibration, or one in doubt."""
     heads = ("vehicle", "session", "recorded", "verdict", "deg 95 %", "cm 95 %", "AED px")
-    yield from aligned([heads, *map(_cells, table.sessions)])
+    yield from table_lines([heads, *map(_cells, table.sessions)])
     yield ""
     yield _counts(table.sessions)
     yield from _why_lines(table.sessions)

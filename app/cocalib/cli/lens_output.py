@@ -12,7 +12,7 @@ from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.coverage import BoardSearch, Coverage
 from calib_core.intrinsics.image_maps import MODEL_ERRORS_UNSEEN, projection_uncertainty, residual_field
 from calib_core.intrinsics.split_difference import split_difference
-from calib_core.recordings import aligned
+from calib_core.recordings import table_lines
 from calib_core.words.intrinsics import halves_text, residuals_text
 from calib_core.words.outcomes import in_sentences
 from cocalib.intrinsics.field_of_view import field_of_view_text
@@ -102,7 +102,7 @@ def _view_lines(lens: CalibratedLens) -> Iterator[str]:
     for view in lens.views:
         used, corners = int(view.used.sum()), len(view.used)
         rows.append((view.corners.name, f"{corners}", f"{used}", f"{view.rms_px:.3f}", f"{view.held_out_rms_px:.3f}"))
-    yield from aligned(rows, right=range(1, 5))
+    yield from table_lines(rows, right=range(1, 5))
 
 
 def convert_camera(path: Path, *, to: str | None, out: Path | None, size_px: tuple[int, int] | None) -> int:

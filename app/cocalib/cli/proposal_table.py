@@ -8,7 +8,7 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, Proposals
 from calib_core.proposing.proposals import named_proposals
-from calib_core.recordings import aligned
+from calib_core.recordings import table_lines
 from calib_core.words.warnings import probability_text
 
 _HEAD = ("id", "time [s]", "range [m]", "column [px]", "row [px]", "sigma [px]", "confidence", "reason")
@@ -39,7 +39,7 @@ def proposal_lines(
         for name, one in named_proposals(proposals, views, confirmed)
     ]
     return [
-        *(aligned([_HEAD, *rows], right=range(1, len(_HEAD) - 1)) if rows else []),
+        *(table_lines([_HEAD, *rows], right=range(1, len(_HEAD) - 1)) if rows else []),
         *unproposed_lines(proposals, origin),
         _summary(proposals, confirmed),
     ]

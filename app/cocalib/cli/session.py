@@ -153,7 +153,7 @@ def _click_count(count: int, what: str) -> str:
 
 
 def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
-    from calib_core.recordings import aligned
+    from calib_core.recordings import table_lines
 
     rows = [("state", "clicks", "steps", "last change", "recording", "folder")]
     rows += [
@@ -167,7 +167,7 @@ def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
         )
         for each in sessions
     ]
-    lines = list(aligned(rows))
+    lines = list(table_lines(rows))
     for index, each in reversed(list(enumerate(sessions, start=1))):
         if each.about:
             lines.insert(index + 1, f"  {each.about}")

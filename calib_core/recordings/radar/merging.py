@@ -11,7 +11,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, TimesNs, Values, Vector3
 from calib_core.association.clustering import CLUSTER_SCALE, report_spread
-from calib_core.measurements import RadarScans
+from calib_core.measurements import RETURN_COLUMNS, RadarScans
 from calib_core.radar import direction_cosines
 from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.layouts import RadarLayout
@@ -191,10 +191,7 @@ def _reported(whole: RadarScans, scans: RadarScans, spread: Spread) -> Flags:
 def _stacked(parts: Sequence[RadarScans], labels: Indices | None) -> RadarScans:
     """Put the returns of the same moments of several topics together, with their labels as alternatives."""
     order = np.argsort(np.concatenate([part.scan_of_return() for part in parts]), kind="stable")
-    columns = {
-        name: np.concatenate([getattr(part, name) for part in parts])[order]
-        for name in ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar")
-    }
+    columns = {name: np.concatenate([getattr(part, name) for part in parts])[order] for name in RETURN_COLUMNS}
     first = np.sum([part.first_return for part in parts], axis=0)
     alternative_of = None if labels is None else labels[order]
     return RadarScans(times_ns=parts[0].times_ns, first_return=first, alternative_of=alternative_of, **columns)

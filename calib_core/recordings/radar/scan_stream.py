@@ -14,7 +14,7 @@ import numpy as np
 from calib_core.arrays import Points3, TimesNs, frozen_array
 from calib_core.errors import MessageError, RecordingError
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, RETURN_COLUMNS, RadarScans, TimeNs
 from calib_core.recordings.radar.columns import Returns, no_returns
 from calib_core.recordings.radar.layouts import RadarLayout
 from calib_core.recordings.radar.message_layouts.point_clouds import CloudLayout
@@ -330,20 +330,15 @@ class RadarStream(ScanBlocks):
             self._note_unreadable({message: str(error)})
             return
         self._count(np.array([message]), np.ones(1, dtype=np.int64), single)
-        for name in ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+        for name in RETURN_COLUMNS:
             getattr(returns, name)[row] = getattr(single, name)[0]
 
 
 def _join_returns(scans: Sequence[Returns]) -> Returns:
     if len(scans) < 2:
         return scans[0] if scans else no_returns()
-    return Returns(
-        np.concatenate([scan.points_radar_m for scan in scans]),
-        np.concatenate([scan.doppler_mps for scan in scans]),
-        np.concatenate([scan.snr_db for scan in scans]),
-        np.concatenate([scan.sigma_polar for scan in scans]),
-        _joined_claims(scans),
-    )
+    columns = {name: np.concatenate([getattr(scan, name) for scan in scans]) for name in RETURN_COLUMNS}
+    return Returns(**columns, claimed_polar=_joined_claims(scans))
 
 
 def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
@@ -353,13 +348,8 @@ def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
 
 def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:
     """Build scans from returns that nothing else references."""
-    for column in (returns.points_radar_m, returns.doppler_mps, returns.snr_db, returns.sigma_polar):
+    columns = {name: getattr(returns, name) for name in RETURN_COLUMNS}
+    for column in columns.values():
         column.setflags(write=False)
-    return RadarScans(
-        times_ns=times_ns,
-        first_return=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        points_radar_m=returns.points_radar_m,
-        doppler_mps=returns.doppler_mps,
-        snr_db=returns.snr_db,
-        sigma_polar=returns.sigma_polar,
-    )
+    first_return = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    return RadarScans(times_ns=times_ns, first_return=first_return, **columns)
