@@ -180,7 +180,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
     calibration = file.calibration
     expected = compare(imported(file), read_any(text_of(file, "tf2"))).pixels
     squares = []
-    for _ in range(120):
+    for _ in range(60):
         error = rng.multivariate_normal(np.zeros(6), calibration.covariance)
         pose = dataclasses.replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(error))
         other = compare(imported(file), imported(dataclasses.replace(file, calibration=pose)))
