@@ -29,6 +29,8 @@ from tests.browser.driving import PATIENCE_S, Driver
 __all__ = ["RemoteDriver", "firefox", "webkit"]
 
 SIZE_PX = (1280, 720)
+_LONGEST_S = 200
+"""No condition in the page is waited for longer."""
 _KEYS = {"Control": "\ue009", "Enter": "\ue007"}
 _DOWN, _UP = {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}
 
@@ -147,7 +149,7 @@ class _Firefox(RemotePage):
         self._sent += 1
         self._socket.send(json.dumps({"id": self._sent, "method": method, "params": params}))
         while True:
-            message = json.loads(self._socket.recv(2 * PATIENCE_S))
+            message = json.loads(self._socket.recv(_LONGEST_S))
             if message.get("method") == "log.entryAdded" and message["params"]["level"] == "error":
                 self._errors.append(message["params"]["text"])
             if message.get("id") == self._sent:
@@ -164,7 +166,7 @@ class _WebKit(RemotePage):
         capabilities = {"alwaysMatch": {"webkitgtk:browserOptions": options}}
         session = self._call(capabilities=capabilities)
         self._address += f"/{session['sessionId']}"
-        self._call("/timeouts", script=2000 * PATIENCE_S)
+        self._call("/timeouts", script=1000 * _LONGEST_S)
 
     def goto(self, url: str) -> None:
         self._call("/url", url=url)
@@ -189,7 +191,7 @@ class _WebKit(RemotePage):
         data = json.dumps(body).encode() if method == "POST" else None
         request = urllib.request.Request(f"{self._address}{path}", data, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=3 * PATIENCE_S) as answer:
+            with urllib.request.urlopen(request, timeout=_LONGEST_S + PATIENCE_S) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
             with error:

@@ -16,6 +16,7 @@ from tests.serving import serving
 pytestmark = pytest.mark.browser
 
 _OFFERED = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
+_LOOKING_S = 120.0  # until so many images are looked at, beside other tests
 _WHY = "document.querySelector('#space > .space-why').textContent"
 
 
@@ -50,7 +51,7 @@ def marks(page: Driver) -> list[tuple[float, float]]:
 
 
 def accept_proposals(page: Driver, count: int) -> None:
-    page.until(f"__cocalib.state.proposals?.rows.length > {count}")
+    page.until(f"__cocalib.state.proposals?.rows.length > {count}", _LOOKING_S)
     for number in range(count):
         while len(marks(page)) == number:  # what has just moved is not accepted
             page.until(_OFFERED)

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.options import GatingOptions
-from calib_core.results import Calibration, DataWarning, NextPlacement, PairResult
+from calib_core.results import Calibration, DataWarning, PairResult
 from calib_core.results.actions import (
     Action,
     ChooseReturn,
@@ -19,24 +19,12 @@ from calib_core.results.actions import (
     ReviewPairs,
     SetOption,
 )
-from calib_core.results.verdict import (
-    SURE_PAIRS,
-    Verdict,
-    by_consequence,
-    consequence_of,
-    verdict_on,
-)
+from calib_core.results.verdict import SURE_PAIRS, Verdict, by_consequence, consequence_of, verdict_on
+from calib_core.words import collecting
+from calib_core.words.collecting import few_pairs, many_left
 from calib_core.words.outcomes import by_cause, in_sentences
 from calib_core.words.text import Words, listed, named, say, sentence, words
-from calib_core.words.verdict import (
-    action_of,
-    action_words,
-    assumed_words,
-    error_text,
-    placement_words,
-    verdict_line,
-    verdict_rest,
-)
+from calib_core.words.verdict import action_of, action_words, assumed_words, verdict_line, verdict_rest
 from cocalib.session.applying import History
 from cocalib.session.state import Outcome, RecordingFacts, Session
 from cocalib.view.click_rows import click_rows, disagreement
@@ -237,16 +225,12 @@ def verdict_row(verdict: Verdict, session: Session, left: int | None) -> Verdict
     misfits = [pair for pair in used if not pair.inlier and pair.rival < 0 and disagreement(session.options).of_pair]
     doubt = max((pair for pair in used if pair.inlier), key=lambda pair: pair.outlier_probability, default=None)
     suspect = named(doubt.id) if doubt is not None and doubt.outlier_probability > _SUSPECT else Words()
-    do_not_fit = say(
-        "{ids} {do} not fit", ids=listed([pair.id for pair in misfits]), do="do" if misfits[1:] else "does"
-    )
-    seen = _Seen(
-        verdict, outcome, tuple(used), do_not_fit if misfits else Words(), suspect, left != 0, bool(session.clicks)
-    )
+    do_not_fit = collecting.misfits_of([pair.id for pair in misfits])
+    seen = _Seen(verdict, outcome, tuple(used), do_not_fit, suspect, left != 0, bool(session.clicks))
     rule = next((rule for rule in _RULES if rule.holds(seen)), _AS_STATED)
     asks = rule.kind == "asks"
     action = ReviewPairs((doubt.id,)) if asks and doubt is not None else action_of(verdict)
-    asked = say("Is the mark of {pair} on the inner corner?", pair=suspect) if asks else Words()
+    asked = collecting.mark_question(suspect) if asks else Words()
     return VerdictRow(
         level="coarse" if rule.kind in ("asks", "wrong") else verdict.level,
         word="" if rule.line else verdict.level,
@@ -329,22 +313,6 @@ def _is(now: _Seen, code: str, **facts: int) -> bool:
     )
 
 
-def _counted(now: _Seen, what: Words | str) -> Words:
-    """Return how many pairs there are of those that a verdict needs, and what is to be said of them."""
-    return f"{now.agreeing} of {SURE_PAIRS} pairs; " + words(what)
-
-
-def _within(now: _Seen, what: Words | str) -> Words:
-    """Return how many pairs there are, what is to be said of them, and how large the error still is."""
-    error = now.verdict.error
-    return say(
-        "{count} pairs{what}; so far within {error}",
-        count=len(now.used),
-        what=what,
-        error=error_text(error) if error else "",
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class _Rule:
     """A line of the verdict.
@@ -360,40 +328,43 @@ class _Rule:
     kind: Literal["stated", "calm", "asks", "wrong"] = "stated"
 
 
+def _few(
+    holds: Callable[[_Seen], object], what: Callable[[_Seen], Words], kind: Literal["calm", "asks", "wrong"]
+) -> _Rule:
+    """Return a rule for few pairs."""
+    return _Rule(lambda now: now.few and holds(now), lambda now: few_pairs(now.agreeing, what(now)), kind)
+
+
 _AS_STATED = _Rule(lambda _: True, None)
 _RULES = (
     _Rule(lambda now: now.verdict.level in ("good", "usable"), None),
-    _Rule(lambda now: not now.clicked, lambda _: words("No clicks yet"), "calm"),
-    _Rule(lambda now: now.outcome is None, lambda _: words("No answer yet"), "calm"),
+    _Rule(lambda now: not now.clicked, lambda _: collecting.NO_CLICKS, "calm"),
+    _Rule(lambda now: now.outcome is None, lambda _: collecting.NO_ANSWER, "calm"),
     _Rule(
         lambda now: _is(now, "too-few-pairs"),
-        lambda now: words(
-            f"{now.outcome.facts.get('used', 0) if isinstance(now.outcome, Unsolvable) else 0} of {SURE_PAIRS} pairs"
-        ),
+        lambda now: few_pairs(now.outcome.facts.get("used", 0) if isinstance(now.outcome, Unsolvable) else 0),
         "calm",
     ),
     _Rule(
         lambda now: _is(now, "no-pose", agreeing=MIN_PAIRS - 1, pairs=MIN_PAIRS),
-        lambda _: words(f"One of the {MIN_PAIRS} does not fit"),
+        lambda _: collecting.MISFIT_OF_FEW,
         "wrong",
     ),
-    _Rule(lambda now: now.few and now.misfits, lambda now: _counted(now, now.misfits), "wrong"),
-    _Rule(
-        lambda now: now.few and any(pair.rival >= 0 and not pair.inlier for pair in now.used),
-        lambda now: _counted(now, "a return is open"),
+    _few(lambda now: now.misfits, lambda now: now.misfits, "wrong"),
+    _few(
+        lambda now: any(one.rival >= 0 and not one.inlier for one in now.used),
+        lambda _: collecting.RETURN_OPEN,
         "wrong",
     ),
+    _few(lambda now: now.all_agree and now.suspect, lambda now: collecting.check(now.suspect), "asks"),
+    _few(lambda now: now.all_agree and "two-poses" in _grave(now.outcome), lambda _: collecting.TWO_ANSWERS, "calm"),
+    _few(lambda now: now.all_agree, lambda _: collecting.CONSISTENT, "calm"),
     _Rule(
-        lambda now: now.few and now.all_agree and now.suspect, lambda now: _counted(now, "check " + now.suspect), "asks"
+        lambda now: _only_large(now) and now.suspect,
+        lambda now: many_left(len(now.used), now.verdict.error, collecting.check(now.suspect)),
+        "asks",
     ),
-    _Rule(
-        lambda now: now.few and now.all_agree and "two-poses" in _grave(now.outcome),
-        lambda now: _counted(now, "two answers fit so far"),
-        "calm",
-    ),
-    _Rule(lambda now: now.few and now.all_agree, lambda now: _counted(now, "looks consistent"), "calm"),
-    _Rule(lambda now: _only_large(now) and now.suspect, lambda now: _within(now, "; check " + now.suspect), "asks"),
-    _Rule(_only_large, lambda now: _within(now, " agree"), "calm"),
+    _Rule(_only_large, lambda now: many_left(len(now.used), now.verdict.error), "calm"),
 )
 """What is said while pairs are few, or many are left: the first that holds. From enough pairs on, the verdict as it is stated."""
 
@@ -417,9 +388,6 @@ def _option(action: Action, session: Session) -> str:
     return action.name if isinstance(action, SetOption) else ""
 
 
-_NOTICEABLE = 0.05
-
-
 def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
     """Return where the next placement would help most; None where that is unknown, as with the paper's method.
 
@@ -430,14 +398,5 @@ def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
     best = calibration.next_placement
     if best is None:
         return None
-    return Advice(best, float(np.linalg.norm(best.position_radar_m)), _advice_words(best, verdict))
-
-
-def _advice_words(best: NextPlacement, verdict: Verdict) -> str:
-    """Return where a placement would help most; "" if the verdict's action says it."""
-    if isinstance(verdict.action, PlaceReflector):
-        return ""
-    if best.may_stop:
-        return "Further placements would not help noticeably."
-    amount = f"{100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
-    return f"One more placement {placement_words(*best.position_radar_m[:2].tolist())}: {amount} less uncertainty."
+    said = "" if isinstance(verdict.action, PlaceReflector) else collecting.next_placement_words(best)
+    return Advice(best, float(np.linalg.norm(best.position_radar_m)), said)

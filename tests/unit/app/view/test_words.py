@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from calib_core.diagnostics.next_placement import Coverage, Place
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_images import LeftOutImage
 from calib_core.measurements import Unpaired, Unsolvable
-from calib_core.results import DataWarning, NextPlacement
+from calib_core.results import Calibration, DataWarning, NextPlacement, PairResult
 from calib_core.results.actions import (
     Action,
     CalibrateLens,
@@ -66,6 +66,25 @@ def _views() -> Iterator[tuple[str, View]]:
         "a warning",
         shown(5, calibration(*FIVE, warnings=(DataWarning.reported("few-pairs", "only 5 pairs", "add some"),))),
     )
+    yield "too few pairs", shown(3, Unsolvable("too-few-pairs", {"used": 2, "needed": 4, "excluded": 1, "unpaired": 0}))
+    yield "one of four does not fit", shown(4, Unsolvable("no-pose", {"agreeing": 3, "pairs": 4}))
+    yield "a pair that may be wrong", shown(5, calibration(*FIVE[:4], _SUSPECT))
+    two_poses = (DataWarning("two-poses", {**_AWAY, "sigmas": 48.0}),)
+    for gain, may_stop in ((1.2, False), (1.01, False), (1.0, True)):
+        best = replace(_best(8.0, -3.0, may_stop=may_stop), gain=gain)
+        outcome = calibration(*FIVE, warnings=two_poses, next_placement=best)
+        yield f"two poses fit five pairs, and a further placement: {gain}", shown(5, outcome)
+    yield "a large error", shown(9, _large(*_NINE))
+    yield "a large error, and a pair that may be wrong", shown(9, _large(*_NINE[:-1], replace(_SUSPECT, id="c9")))
+
+
+_AWAY = {"away_deg": 12.0, "away_cm": 84.0}
+_SUSPECT = pair("c5", outlier_probability=0.2)
+_NINE = tuple(pair(f"c{number}") for number in range(1, 10))
+
+
+def _large(*pairs: PairResult, **more: Any) -> Calibration:
+    return calibration(*pairs, covariance=np.diag([0.04, 0.04, 0.04, 1e-3, 1e-3, 1e-3]), **more)
 
 
 def _best(x_m: float, y_m: float, *, may_stop: bool) -> NextPlacement:
@@ -93,13 +112,14 @@ def _lines(name: str, seen: View) -> Iterator[str]:
     yield f"status: {seen.status or 'none'}"
     yield f"verdict: {seen.verdict.word}{seen.verdict.line}"
     yield f"action: {seen.verdict.action}"
+    if seen.advice is not None:
+        yield f"advice: {seen.advice.words}"
     yield from (f"{one.key}: {one.name}. {one.hint}" for one in seen.metrics)
     yield from (f"{row.id}: {row.note}" for row in seen.clicks if row.note)
 
 
 _DAMAGE = DataWarning.reported("damaged-file", "radar.bag: chunk 7 is damaged", "copy it again")
 _SCALE = SystematicErrorResult("azimuth_scale", 0.012, 0.009, 0.02, True, 0.51, 0.05)
-_AWAY = {"away_deg": 12.0, "away_cm": 84.0}
 _SCORES = {"score": 31.0, "by_chance": 25.0, "rival": 29.0}
 _BOARD = Board("checkerboard", 9, 6, 0.025)
 _IMAGE = {"clicks": 9, "width_px": 640, "height_px": 480}
