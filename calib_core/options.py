@@ -475,9 +475,10 @@ def _unit_after(path: str) -> str:
 def _other_units(name: str, number: float) -> str:
     """Say what a length that is out of range would be if it was given in centimeters or millimeters; "" if it is no such."""
     low, high = RANGES[name]
-    if unit_of_name(name) != "m" or number <= high or not low <= number / 1000 <= high:
+    size = abs(number)
+    if unit_of_name(name) != "m" or size <= high or not low <= number / 1000 <= high:
         return ""
-    metres = f" or {number / 100:g}" if number / 100 <= high else ""
+    metres = f" or {number / 100:g}" if size / 100 <= high else ""
     return f". Give meters: {number / 1000:g}{metres}, if it is in millimeters{' or centimeters' if metres else ''}"
 
 

@@ -23,7 +23,7 @@ from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import GncSolution, solve_gnc
 from calib_core.estimation.initialization import initial_poses
-from calib_core.estimation.marginal_likelihood import log_pose_prior
+from calib_core.estimation.marginal_likelihood import log_determinant, log_pose_prior
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.estimation.pose_posterior import pose_posterior
 from calib_core.estimation.posterior_peaks import Modes, posterior_peaks, refine_poses
@@ -123,7 +123,7 @@ def _starts(
 def _log_ratios(modes: Modes, free: CameraPrior) -> Values:
     """Return equation (8) of each mode."""
     prior = log_pose_prior(free)
-    return np.asarray(modes.log_likelihood + prior - 0.5 * np.linalg.slogdet(modes.hessians)[1])
+    return np.asarray(modes.log_likelihood + prior - 0.5 * log_determinant(modes.hessians))
 
 
 _CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75

@@ -31,8 +31,15 @@ def log_marginal_likelihood(measurements: PairMeasurements, fit: ErrorsInVariabl
     posterior = pose_posterior(measurements.with_errors(errors.values), fit.camera_from_radar)
     (cost,) = posterior.pose_costs(Poses.of([fit.camera_from_radar]), np.log(fit.noise_scale)[None])
     hessian, _ = normal_equations(fit.measurements, fit.camera_from_radar, fit.model, fit.weights)
-    volume = np.linalg.slogdet(hessian)[1] - np.linalg.slogdet(errors.prior_information)[1]
+    volume = log_determinant(hessian) - log_determinant(errors.prior_information)
     return float(log_pose_prior(measurements.prior) - 0.5 * (cost + errors.squared + volume))
+
+
+def log_determinant(information: np.ndarray) -> np.ndarray:
+    """Return log det (...) of informations; infinite for one that is singular to rounding: nothing peaks there."""
+    with np.errstate(divide="ignore"):
+        sign, logarithm = np.linalg.slogdet(information)
+    return np.where(sign > 0.0, logarithm, np.inf)
 
 
 def log_pose_prior(prior: CameraPrior) -> float:

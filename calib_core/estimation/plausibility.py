@@ -25,7 +25,8 @@ _SIDEWAYS_RAD = np.deg2rad(60.0)  # degrees, a choice: within a usual field of v
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
 _PART_OF_IMAGE = 0.5
-_FARTHEST_OFF_MIDDLE = 0.12  # of the width or height: cameras publish up to 8 %
+_FAR_OFF_MIDDLE, _FARTHEST_OFF_MIDDLE = 0.05, 0.12
+"""Of the width or height: KITTI, TUM RGB-D, EuRoC, nuScenes and Cityscapes publish up to 4.6 %, webcams up to 8 %."""
 # ratios of width to height that sensors and screens have, by name
 _ASPECT_RATIOS = {"4:3": 4.0 / 3.0, "16:9": 16.0 / 9.0, "3:2": 1.5, "16:10": 1.6, "5:4": 1.25, "1:1": 1.0}
 _BETTER, _NEAR_MIDDLE = 9.2, 4.0
@@ -102,8 +103,13 @@ def _another_image(camera: Camera) -> list[DataWarning]:
     modes = {name: _off_another(camera, ratio) for name, ratio in _ASPECT_RATIOS.items()}
     mode = min(modes, key=modes.__getitem__)
     better = float(share @ share) / OFF_MIDDLE**2 - modes[mode] > _BETTER
-    if not off_px.any() or not (better or share.max() > _FARTHEST_OFF_MIDDLE):
-        return []
+    if not (better or share.max() > _FARTHEST_OFF_MIDDLE):
+        right, down = (off_px / size).tolist()
+        return (
+            [DataWarning("principal-point-off", {"right": right, "down": down})]
+            if share.max() > _FAR_OFF_MIDDLE
+            else []
+        )
     facts = {
         "principal_point_px": camera.matrix_px[:2, 2].tolist(),
         "width_px": camera.width_px,

@@ -757,6 +757,23 @@ def _off_middle(principal_point_px: Sequence[float], width_px: int, height_px: i
     )
 
 
+def principal_point_off(*, right: float, down: float) -> Remark:
+    """Given when the principal point is 5 to 12 % of the image's width or height from its middle, farther than published
+    calibrations of usual cameras have it.
+
+    Could also be: a lens that is mounted so, as in some webcams: then nothing is wrong.
+    """
+    aside = f"{100 * abs(right):.0f} % to the {'right' if right > 0.0 else 'left'}"
+    above = f"{100 * abs(down):.0f} % {'below' if down > 0.0 else 'above'}"
+    return remark(
+        f"the principal point is {aside} and {above} the middle of the image, "
+        "farther than usual: if the intrinsics belong to another image, the pose is turned by as much, and no residual shows it",
+        "make sure that the intrinsics are those of this camera, image size and crop; a board calibration says how well it knows "
+        "the principal point",
+        CalibrateLens(),
+    )
+
+
 def radar_axes_suspected(*, side: str, behind: int, pairs: int) -> Remark:
     """Given when by the given axes the placements are beside the radar or behind it.
 
@@ -975,6 +992,7 @@ SOLVER = by_code(
     one_pair_decides,
     pixels_suspected,
     placement_ranges,
+    principal_point_off,
     radar_axes_suspected,
     radar_in_vehicle_frame,
     radar_missing,

@@ -220,7 +220,10 @@ def test_a_webcam_that_is_off_its_middle_stays_usable():
     calibration = with_clicks_of(simulated, webcam)
     assert of_image(calibration) == []
     assert verdict_on(calibration).level in ("usable", "good")
+    (told,) = (one for one in calibration.warnings if one.code == "principal-point-off")
+    assert (told.facts["right"], told.facts["down"]) == pytest.approx((0.068, -0.081), abs=0.001)
     middle = with_clicks_of(simulated, with_principal_point(simulated.camera, 0.0, 0.0))
+    assert "principal-point-off" not in {one.code for one in middle.warnings}
     assert stated_error(calibration).rotation_deg > stated_error(middle).rotation_deg
 
 
