@@ -104,9 +104,12 @@ def _sigma_polar_rows(sigma_polar: np.ndarray | None, noise: NoiseOptions, count
         )
     if not (np.isfinite(sigmas).all() and (sigmas > 0).all()):
         raise InputError("sigma_polar: every standard deviation must be finite and above zero")
+    if (widest := float(sigmas[..., 1:].max())) > _WIDEST_RAD:
+        raise InputError(f"sigma_polar: {widest:g} rad is no radar's angle; give radians, as np.deg2rad({widest:g})")
     return np.broadcast_to(sigmas, (count, 3)).copy()
 
 
+_WIDEST_RAD = np.deg2rad(20.0)  # of a standard deviation, a choice: a beam without any interpolation is narrower
 NEAREST_RETURN_M = 0.1
 """A reflector nearer than this is not a return of its own; angles of such a position mean nothing."""
 
