@@ -54,6 +54,7 @@ class CandidateRays:
         sigma_rad: (n, k) standard deviation of each candidate across its ray.
         odds: (n, k) probability that the candidate is the reflector, before any pose is known.
         missing: (n,) probability that none is.
+        likely: (n,) probability that the radar's position is the true one of its returns.
         density: (n, k) of wrong candidates around the candidate [1 / sr].
         click: (n, k) row of the confirmed click that the candidate is; -1 for none.
         is_flat: the radar measures no elevation.
@@ -68,6 +69,7 @@ class CandidateRays:
     sigma_rad: Points2
     odds: Points2
     missing: Values
+    likely: Values
     density: Points2
     click: Indices
     is_flat: bool
@@ -85,6 +87,7 @@ class CandidateRays:
             sigma_rad=(n, k),
             odds=(n, k),
             missing=(n,),
+            likely=(n,),
             density=(n, k),
         )
         freeze(self, np.int64, click=(n, k))
@@ -114,7 +117,7 @@ def candidate_rays(
     """Collect the candidates of all dwells, and what is known of them before the dwells are compared.
 
     Args:
-        views: of all placements; at least one.
+        views: of all placements, each at one position; at least one.
         camera: the intrinsics.
         options: noise of the radar and of clicks.
         confirmed: clicks; one that lies within several dwells is a candidate of each.
@@ -143,6 +146,7 @@ def candidate_rays(
         tangents=_tangents(rays),
         sigma_rad=np.maximum(sigma_px, _LEAST_SIGMA_PX) * per_px,
         odds=odds,
+        likely=np.array([view.placement.likely for view in views]),
         missing=np.maximum(1.0 - odds.sum(axis=1), _LEAST_MISSING),
         density=_density(pixels, odds, apart_in_time(views), camera) / per_px**2,
         click=np.array([[one.click for one in own] for own in padded], dtype=np.int64),
@@ -154,6 +158,11 @@ def _sigma_polar(options: CalibrationOptions, *, flat: bool) -> Values:
     noise = options.noise
     elevation_rad = OWN_SIGMA_RAD if flat else np.deg2rad(noise.sigma_elevation_deg)
     return np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), elevation_rad])
+
+
+def by_position(views: Sequence[DwellView]) -> tuple[DwellView, ...]:
+    """Return each view at each position that its returns may have."""
+    return tuple(replace(view, placement=placement) for view in views for placement in view.placement.at_each)
 
 
 def weaker_db(views: Sequence[DwellView]) -> Values:
@@ -185,7 +194,9 @@ def _choices(
         for row, click in enumerate(confirmed)
         if _is_within(click, view)
     ]
-    share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
+    share = view.placement.likely / (
+        1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS)))
+    )
     share *= 1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT)
     found = []
     for one, odds in zip(view.candidates, _odds(view.candidates), strict=True):

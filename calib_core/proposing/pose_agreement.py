@@ -280,7 +280,7 @@ def _judged_by_others(rays: CandidateRays, prior: MountingPrior, pose: RoughPose
 
 def _share(rays: CandidateRays, probability: Points2) -> float:
     with_any = (rays.odds > 0.0).any(axis=1)
-    return float(probability.max(axis=1)[with_any].sum() / max(int(with_any.sum()), 1))
+    return float(min(probability.max(axis=1)[with_any].sum() / max(rays.likely[with_any].sum(), 1e-9), 1.0))
 
 
 _MOST_PAIRED = 600

@@ -10,7 +10,7 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
+from calib_core.proposing.candidate_rays import CandidateRays, by_position, candidate_rays, weaker_db
 from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
@@ -78,7 +78,8 @@ def proposals_of(
     if not views:
         return Proposals(())
     clicks = [click for click in confirmed if click.counts]
-    rays = candidate_rays(views, camera, options, confirmed=clicks)
+    placed = by_position(views)
+    rays = candidate_rays(placed, camera, options, confirmed=clicks)
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
@@ -87,19 +88,23 @@ def proposals_of(
     if chance is not None and agreement is not None:
         # deals are compared roughly: what full images do not repeat was chance
         chance = replace(chance, score=min(chance.score, agreement.score))
-    judged = _Judged.of(views, rays, agreement, by_clicks, chance)
+    judged = _Judged.of(placed, rays, agreement, by_clicks, chance)
     covered, slips = _clicks_by_dwell(rays, judged, clicks, camera)
-    marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
+    marks = [(placed[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
-    for i, view in enumerate(views):
-        if i in covered:
+    last = 0
+    for view in views:
+        rows = range(last, last + len(view.placement.at_each))
+        last = rows.stop
+        if covered.keys() & set(rows):
             continue
-        proposal = judged.proposal(i)
+        best = max(rows, key=lambda i: float(judged.probability[i].max()))
+        proposal = judged.proposal(best)
         if proposal is None:
-            unproposed.append((view.placement, judged.reason(i)))
+            unproposed.append((view.placement, judged.reason(best)))
         elif (marked := _marked(proposal, view, marks)) is None:
-            ranked.append(proposal)
+            ranked.append(replace(proposal, placement=view.placement))
         else:
             range_m = np.linalg.norm(marked.position_radar_m)
             unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))

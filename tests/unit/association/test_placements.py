@@ -191,6 +191,19 @@ def test_of_several_azimuths_the_one_in_both_types_of_scan_is_the_true_one():
     scans = scans_of_two_types({0: (wrong, REFLECTOR), 1: (REFLECTOR, other)})
     (placement,) = find_placements(scans, GatingOptions())
     assert placement.position_radar_m == pytest.approx(REFLECTOR)
+    assert not len(placement.others_radar_m)
+
+
+def test_azimuths_that_are_shown_as_often_are_positions_of_one_placement_the_one_listed_first_in_front():
+    second = (6.0, -2.0, -0.8)
+    shown = scans_of_two_types({0: (REFLECTOR, second), 1: (REFLECTOR, second)})
+    (placement,) = find_placements(shown, GatingOptions())
+    assert placement.position_radar_m == pytest.approx(REFLECTOR)
+    assert placement.others_radar_m == pytest.approx(np.array([second]))
+    first, other = placement.at_each
+    assert other.position_radar_m == pytest.approx(second)
+    assert first.likely > other.likely
+    assert first.likely + other.likely == pytest.approx(1.0)
 
 
 def test_the_azimuth_listed_first_is_taken_where_clutter_hides_it_at_other_times():

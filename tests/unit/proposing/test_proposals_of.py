@@ -97,6 +97,25 @@ def test_one_click_makes_proposals_of_two_dwells_possible():
     assert all(right(drawn, proposed(drawn, (0,))))
 
 
+def test_the_images_decide_between_two_positions_of_the_same_returns():
+    drawn = draw_views(1, Drawing(count=8, clutter=0))
+    positions = [view.placement.position_radar_m for view in drawn.views]
+    mirrored = [position * [1.0, -1.0, 1.0] for position in positions]
+    listed = [
+        (own, other) if row % 4 else (other, own)
+        for row, (own, other) in enumerate(zip(positions, mirrored, strict=True))
+    ]
+    views = tuple(
+        replace(view, placement=replace(view.placement, position_radar_m=first, others_radar_m=second[None]))
+        for view, (first, second) in zip(drawn.views, listed, strict=True)
+    )
+    both = proposals_of(views, drawn.camera, OPTIONS)
+    assert len(both.ranked) >= 7
+    assert all(right(drawn, both))
+    assert {one.placement for one in both.ranked} <= {view.placement for view in views}
+    assert {views[0].placement, views[4].placement} & {one.placement for one in both.ranked}
+
+
 def test_the_proposed_pixel_is_always_a_candidate_of_the_image():
     drawn = draw_views(4)
     candidates = {view.placement.start: view.candidates for view in drawn.views}
