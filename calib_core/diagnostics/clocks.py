@@ -138,13 +138,9 @@ def clocks_apart(
             facts = {"shifted_agreeing": int(other.inliers.sum()), "shifted_clicks": len(clicks)}
     if chosen is None:
         return []
-    facts |= {
-        "placements": chosen.placements,
-        "agreeing": agreeing,
-        "clicks": len(pairs),
-        "apart_s": chosen.apart_s,
-    }
-    return [DataWarning("clocks-apart", facts | ({"scales": chosen.scales} if chosen.scales else {}))]
+    named: Facts = {"scales": chosen.scales} if chosen.scales else {}
+    away: Facts = {"placements": chosen.placements, "apart_s": chosen.apart_s}
+    return [DataWarning("clocks-apart", {**facts, **away, "agreeing": agreeing, "clicks": len(pairs), **named})]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
