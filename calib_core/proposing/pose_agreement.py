@@ -30,6 +30,9 @@ NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Factors on the stated standard deviations of the radar's angles, in the order in which they are tried."""
 
 
+_OF_POSES = ("rotations", "centres_radar_m", "scales", "noise", "scores")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RoughPoses:
     """Several poses, the best first before they are refined, with the noise level at which each explains the candidates best.
@@ -108,7 +111,6 @@ class PoseAgreement:
         rival_score: the same of the best pose that differs clearly; 0 if there is none.
         noise: factor on the stated noise of the radar's angles that the dwells show.
         probability: (n, k) that each candidate is the reflector, judged by the other dwells.
-        rival_probability: (n, k) the same under the rival.
         off_sigma: (n, k) distance of each candidate from where the other dwells predict it, in standard deviations.
         share: of the dwells that have candidates, how many agree on the pose.
         rival_share: the same for the rival.
@@ -120,14 +122,13 @@ class PoseAgreement:
     rival_score: float
     noise: float
     probability: Points2
-    rival_probability: Points2
     off_sigma: Points2
     share: float
     rival_share: float
     trials: int
 
     def __post_init__(self) -> None:
-        freeze(self, probability=(None, None), rival_probability=(None, None), off_sigma=(None, None))
+        freeze(self, probability=(None, None), off_sigma=(None, None))
 
     @property
     def likeliest(self) -> Indices:
@@ -157,10 +158,7 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
     best = int(np.argmax(poses.scores))
     other = np.flatnonzero(_differs(rays, poses, best))
     rival = int(other[np.argmax(poses.scores[other])]) if len(other) else None
-    probability, off_sigma = _judged_by_others(rays, prior, _one(poses, best))
-    rival_probability = np.zeros_like(probability)
-    if rival is not None:
-        rival_probability = _judged_by_others(rays, prior, _one(poses, rival))[0]
+    probability, off_sigma = _judged_by_others(rays, prior, _row(poses, best))
     rotation, centre = poses.rotations[best], poses.centres_radar_m[best]
     return PoseAgreement(
         camera_from_radar=RigidTransform(rotation, -rotation @ centre),
@@ -168,29 +166,17 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
         rival_score=0.0 if rival is None else float(poses.scores[rival]),
         noise=float(poses.noise[best]),
         probability=probability,
-        rival_probability=rival_probability,
         off_sigma=off_sigma,
         share=_share(rays, probability),
-        rival_share=_share(rays, rival_probability),
+        rival_share=0.0 if rival is None else _share(rays, _judged_by_others(rays, prior, _row(poses, rival))[0]),
         trials=rough.tried,
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ClicksAgreement:
-    """What the clicks alone say of each candidate, through the pose that they leave open.
+def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> Points2:
+    """Return the probability of each candidate (n, k) by the poses that clicks and mounting leave open.
 
-    Attributes:
-        probability: (n, k) that each candidate is the reflector.
-        score: logarithm of how much better the candidates of the other dwells suit such poses than chance.
-    """
-
-    probability: Points2
-    score: float
-
-
-def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> ClicksAgreement:
-    """Judge candidates by the poses that clicks and mounting leave open: each bounds rows and columns at every range.
+    Each click bounds rows and columns at every range.
 
     A click may be of each dwell of its time, which gives as many poses; what the other dwells show weighs them.
 
@@ -213,7 +199,7 @@ def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> ClicksAgreeme
     scores = np.log(total).sum(axis=1) - 0.5 * (precision * off**2).sum(axis=1)
     weight = np.exp((scores - scores.max()) / _CLICK_STEP)
     weight /= weight.sum()
-    return ClicksAgreement(np.einsum("m,mnk->nk", weight, gain / total[..., None]), float(scores.max()))
+    return np.asarray(np.einsum("m,mnk->nk", weight, gain / total[..., None]))
 
 
 def _with_nominal(poses: RoughPoses, information: np.ndarray, prior: MountingPrior) -> tuple[RoughPoses, np.ndarray]:
@@ -244,11 +230,8 @@ def _from_first_click(rays: CandidateRays, prior: MountingPrior) -> RoughPoses:
     return RoughPoses.of_rotations(np.array(rotations), np.array(centres), np.zeros(len(centres)), 0)
 
 
-def _one(poses: RoughPoses, row: int) -> RoughPoses:
-    keep = slice(row, row + 1)
-    return RoughPoses(
-        poses.rotations[keep], poses.centres_radar_m[keep], poses.scales[keep], poses.noise[keep], poses.scores[keep]
-    )
+def _row(poses: RoughPoses, row: int) -> RoughPoses:
+    return RoughPoses(*(getattr(poses, name)[row : row + 1] for name in _OF_POSES))
 
 
 def _differs(rays: CandidateRays, poses: RoughPoses, best: int) -> Flags:
@@ -319,20 +302,20 @@ def rotation_consensus(
         tried: how many to compare at most, about each start.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
-    poseses: list[RoughPoses] = []
+    by_start: list[RoughPoses] = []
     for centre in prior.starts_m:
         rotations = _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))
         scores = _rotation_scores(rays, prior, centre, rotations)
         kept = _best_apart(rotations, scores, most)
         centres = np.tile(centre, (len(kept), 1))
-        poseses.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
-    scores = np.concatenate([posese.scores for posese in poseses])
+        by_start.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
+    scores = np.concatenate([poses.scores for poses in by_start])
     order = np.argsort(-scores, kind="stable")[:most]
     return RoughPoses.of_rotations(
-        np.concatenate([posese.rotations for posese in poseses])[order],
-        np.concatenate([posese.centres_radar_m for posese in poseses])[order],
+        np.concatenate([poses.rotations for poses in by_start])[order],
+        np.concatenate([poses.centres_radar_m for poses in by_start])[order],
         scores[order],
-        sum(posese.tried for posese in poseses),
+        sum(poses.tried for poses in by_start),
     )
 
 
@@ -441,18 +424,9 @@ def refined_poses(rays: CandidateRays, prior: MountingPrior, rough: RoughPoses) 
             poses = _stepped(rays, prior, poses)
         scored = replace(poses, scores=_scores(rays, prior, poses))
         better = scored.scores > best.scores
-        best = RoughPoses(
-            _choose_candidates(better, scored.rotations, best.rotations),
-            _choose_candidates(better, scored.centres_radar_m, best.centres_radar_m),
-            _choose_candidates(better, scored.scales, best.scales),
-            _choose_candidates(better, scored.noise, best.noise),
-            _choose_candidates(better, scored.scores, best.scores),
-        )
+        pairs = [(getattr(scored, name), getattr(best, name)) for name in _OF_POSES]
+        best = RoughPoses(*(np.where(better.reshape(m, *[1] * (new.ndim - 1)), new, old) for new, old in pairs))
     return best
-
-
-def _choose_candidates(better: Flags, new: np.ndarray, old: np.ndarray) -> np.ndarray:
-    return np.where(better.reshape(len(better), *[1] * (new.ndim - 1)), new, old)
 
 
 def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:

@@ -16,7 +16,6 @@ from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
-    ClicksAgreement,
     PoseAgreement,
     clicks_agreement,
     pose_agreement,
@@ -184,7 +183,7 @@ class _Judged:
         views: Sequence[DwellView],
         rays: CandidateRays,
         agreement: PoseAgreement | None,
-        by_clicks: ClicksAgreement | None,
+        by_clicks: Points2 | None,
         chance: Chance | None,
     ) -> "_Judged":
         """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
@@ -196,9 +195,7 @@ class _Judged:
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:
-            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks.probability * _compared_with_click(
-                views, rays
-            )
+            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks * _compared_with_click(views, rays)
         probability = _tempered(probability)
         taken = _taken_by_others(views, rays, probability)
         sure = np.where(taken, 0.0, probability)
