@@ -75,6 +75,7 @@ function drawGuess(pen, u, v) {
 function drawAdvice(pen, advice) {
   if (advice.best.may_stop) return;
   const [x, y] = toDevice(advice.best.pixel_px[0], advice.best.pixel_px[1]);
+  if (x < 0 || y < 0 || x > pen.canvas.width || y > pen.canvas.height) return; // its words alone would point at nothing
   const [wide, high] = [18 * viewport.unit, 9 * viewport.unit];
   outlined(pen, ink.guess, 1.4, () => {
     pen.moveTo(x - wide, y);

@@ -234,7 +234,7 @@ def verdict_row(verdict: Verdict, session: Session, left: int | None) -> Verdict
     return VerdictRow(
         level="coarse" if rule.kind in ("asks", "wrong") else verdict.level,
         word="" if rule.line else verdict.level,
-        line=rule.line(seen) if rule.line else verdict_rest(verdict).with_degree_signs(),
+        line=(rule.line(seen) if rule.line else verdict_rest(verdict)).with_degree_signs(),
         action=asked or sentence(action_words(verdict)),
         assumes=sentence("assumes " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
         kind=type(action).__name__,

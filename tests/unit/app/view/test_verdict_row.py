@@ -10,7 +10,7 @@ from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaire
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
 from calib_core.results.actions import ClickMore, Export, ReduceError
 from calib_core.results.verdict import Assumed, StatedError, Verdict, stated_error, verdict_on
-from calib_core.words.text import PairPart
+from calib_core.words.text import PairPart, with_degree_signs
 from calib_core.words.verdict import error_text
 from cocalib.session.state import RecordingFacts, Session
 from cocalib.view.build import verdict_row
@@ -93,7 +93,7 @@ def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_a
     odd = (*eight, pair("c9", inlier=False))
     agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
     row = verdict_row(coarse, agreeing, 1)
-    assert (row.early, f"within {error_text(error)}" in str(row.line)) == (True, True)
+    assert (row.early, f"within {with_degree_signs(error_text(error))}" in str(row.line)) == (True, True)
     row = verdict_row(coarse, apart, 1)
     assert (row.early, PairPart("c9") in row.misfits.parts) == (False, True), "as long as one is set aside it is named"
     assert not verdict_row(replace(coarse, cause=OF_THE_LENS), agreeing, 1).early
