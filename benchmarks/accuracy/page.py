@@ -21,7 +21,8 @@ aim and the verdict of each, in a file beside the benchmark. Real pairs and reco
 - **Measure the camera position.** {tape}
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, and elevations that are all
   wrong alike. The verdict says that it assumes neither; a measured position shows most of both, with an imaging radar all. An
-  image that was cropped after its intrinsics were measured is named where its principal point is far from the middle.
+  image that was cropped after its intrinsics were measured is named where its principal point is far from the middle. Clicks that
+  were set where a wrong pose drew the returns, and an image squeezed along one axis, are shown by no position either.
 - **{missed} of {aims} aims are missed.** They are in bold below, with the rows that miss them.
 
 ## How it was measured
