@@ -36,7 +36,7 @@ def log_marginal_likelihood(measurements: PairMeasurements, fit: ErrorsInVariabl
 
 
 def log_determinant(information: np.ndarray) -> np.ndarray:
-    """Return log det (...) of informations; infinite for one that is singular to rounding: nothing peaks there."""
+    """Return log det (...) of each information (..., k, k); infinite where it is singular to rounding, as nothing peaks there."""
     with np.errstate(divide="ignore"):
         sign, logarithm = np.linalg.slogdet(information)
     return np.where(sign > 0.0, logarithm, np.inf)
