@@ -56,8 +56,7 @@ def test_without_clicks_the_screen_shows_the_file_and_says_so(facts, reference):
 
 
 def test_a_pose_that_is_hardly_known_expects_the_reflector_nowhere(file):
-    others = {name: 0 for name in Placement.__dataclass_fields__}
-    ahead = Placement(**(others | {"position_radar_m": np.array([6.0, 0.5, -0.4])}))
+    ahead = Placement(TimeNs(0), TimeNs(0), np.array([6.0, 0.5, -0.4]), 0.0)
     for covariance, count in ((1e-6, 1), (1.0, 0)):
         pose = Reference("other.yaml", dataclasses.replace(file.calibration, covariance=covariance * np.eye(6)))
         assert len(overlay_of(0, Session(), None, (ahead,), pose).guesses) == count

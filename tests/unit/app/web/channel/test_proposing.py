@@ -75,7 +75,7 @@ def at_desk(
 
 
 async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> ProposalNews:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(120):
         while not (told and holds(told[-1])):
             await asyncio.sleep(0.005)
     news: ProposalNews = told[-1]
