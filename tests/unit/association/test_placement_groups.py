@@ -10,9 +10,10 @@ from calib_core.association.clustering import clusters_of
 from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
 from calib_core.association.gating import static_returns
 from calib_core.association.pairing import balanced_pairs, pair_clicks, scores_of
-from calib_core.association.placement_groups import linked_clicks, placement_groups
+from calib_core.association.placement_groups import click_sigmas, linked_clicks, placement_groups
 from calib_core.association.placements import find_placements
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
+from calib_core.estimation.pair_results import _click_result
 from calib_core.interchange.own.calibration_json import calibration_text
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions, RadarOptions
@@ -132,6 +133,20 @@ def test_every_click_has_a_result_and_metrics_count_placements():
         assert np.isfinite(result.expected_covariance_px2).all()
     assert calibration.metrics.n <= 12
     assert "repeated-placements" not in {warning.code for warning in calibration.warnings}
+
+
+def test_a_single_click_is_expected_farther_off_than_its_placement_by_the_clicks_noise():
+    rng = np.random.default_rng(8)
+    simulated = simulate_pairs(12, rng=rng)
+    pairs = repeated(simulated, 3, rng)
+    calibration = replace(solved(pairs, simulated), noise_scale=(1.5, 1.0, 1.0, 1.0))
+    (group,) = (one for one in placement_groups(pairs, OPTIONS) if pairs[0] in one.clicks)
+    of_pair = calibration.pairs[0]
+    click = _click_result(calibration, of_pair, group.pair, pairs[0], off=False)
+    own_px, pair_px = click_sigmas((pairs[0], group.pair), OPTIONS).tolist()
+    assert own_px > pair_px
+    more = click.expected_covariance_px2 - of_pair.expected_covariance_px2
+    assert more == pytest.approx(1.5**2 * (own_px**2 - pair_px**2) * np.eye(2))
 
 
 def test_solved_again_from_the_clicks_it_has_the_same_bits():

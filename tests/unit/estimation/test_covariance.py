@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
+from benchmarks.simulated_pairs import FIELD, SimulatedPairs, SystematicErrors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.measurements import Pair
@@ -69,6 +69,20 @@ def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair():
         moved.append((stated, influence))
     for stated, influence in moved:
         assert stated == pytest.approx(influence, rel=0.15, abs=0.02)
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_a_held_out_residual_is_that_of_solving_without_the_pair(noise):
+    """The outermost pair says most of the azimuths' scale, which moves it when it is left out."""
+    systematic = SystematicErrors(azimuth_scale=0.1)
+    simulated = simulate_pairs(10, rng=np.random.default_rng(5), noise=noise, systematic=systematic)
+    radar = replace(EXACT.radar, azimuth_scale_sigma=0.1)
+    fixed = replace(EXACT, radar=radar, noise=replace(MEASURED.noise, estimate_scale=False))
+    whole = solved(simulated, fixed)
+    outermost = max(whole.pairs, key=lambda pair: abs(float(np.arctan2(pair.point_radar_m[1], pair.point_radar_m[0]))))
+    without = calibrate_pairs(simulated.pairs, simulated.camera, fixed, frozenset({outermost.id})).unwrap()
+    away_px = without.reproject(outermost.point_radar_m[None])[0] - outermost.pixel_px
+    assert outermost.held_out_px == pytest.approx(float(np.linalg.norm(away_px)), rel=0.03)
 
 
 def test_a_known_noise_level_takes_the_chi_square_quantile():

@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.simulated_pairs import SimulatedPairs, simulate_pairs
 from calib_core.calibration import calibrate_pairs
-from calib_core.estimation.gnc import associate, mixture_cost, solve_gnc
+from calib_core.estimation.gnc import _SCALE_PENALTY, _mixture_costs, associate, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import Hypotheses, hypothesis_costs, initial_poses
 from calib_core.estimation.measurement_model import pair_measurements
-from calib_core.geometry import rotation_angle_rad
+from calib_core.geometry import Poses, rotation_angle_rad
 from calib_core.measurements import Candidate, Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
@@ -195,3 +195,13 @@ def test_two_clicks_of_one_moment_do_not_take_the_same_return():
     assert (measurements.returns[:4] >= 0).all()
     rows, _ = associate(measurements, simulated.camera_from_radar)
     assert sorted(rows[:2] % 2) == [0, 1]
+
+
+def test_a_larger_noise_level_costs_what_larger_sigmas_cost():
+    simulated = simulate_pairs(15, rng=np.random.default_rng(5), noise="imaging")
+    measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED).without_errors()
+    pose = Poses.of([simulated.camera_from_radar])
+    one, two = _mixture_costs(measurements, pose, (1.0, 2.0))[0]
+    (doubled,) = _mixture_costs(measurements.scaled(np.full(4, 2.0)), pose, (1.0,))[0]
+    assert two - _SCALE_PENALTY == pytest.approx(doubled, rel=1e-9)
+    assert one < two

@@ -8,6 +8,9 @@ import pytest
 
 from benchmarks.simulated_pairs import SimulatedPairs, draw_systematic_errors, simulate_pairs
 from calib_core.calibration import calibrate_pairs
+from calib_core.estimation.best_fit import BestFit, best_fit
+from calib_core.estimation.measured_position import _level
+from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.options import HOW_MEASURED, CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
@@ -134,3 +137,17 @@ def test_the_ways_to_measure_have_their_standard_deviations():
     assert CameraPositionPrior((0.1, 0.2, 0.3)).sigma_m == 0.03
     sigmas_m = [CameraPositionPrior.measured((0.1, 0.2, 0.3), how).sigma_m for how in HOW_MEASURED]
     assert sigmas_m == [0.05, 0.02, 0.005]
+
+
+def test_level_axes_are_along_the_ground_and_look_ahead():
+    rig = RigOptions(radar_tilt_deg=15.0)
+    simulated = simulate_pairs(20, rng=np.random.default_rng(9), noise="imaging", rig_options=rig)
+    options = CalibrationOptions()
+    best = best_fit(pair_measurements(simulated.pairs, simulated.camera, options), options)
+    assert isinstance(best, BestFit)
+    up = simulated.rig.radar_from_world.rotation @ np.array([0.0, 0.0, 1.0])
+    radar_from_level = _level(best.refined)
+    assert np.linalg.det(radar_from_level) == pytest.approx(1.0)
+    assert radar_from_level[:, 2] == pytest.approx(up, abs=0.03)
+    assert radar_from_level[0, 0] > 0.9
+    assert radar_from_level[1, 1] > 0.9

@@ -251,6 +251,9 @@ def test_a_folder_of_colmaps_text_files_is_read_as_its_archive(tmp_path, file):
     images = tmp_path / "images.txt"
     images.write_text("".join(line for line in images.read_text().splitlines(keepends=True) if line[0] != "#"))
     assert "its world frame" in read_any_file(images).assumptions[0]
+    pose, points = images.read_text().splitlines()[0], "10.5 20.5 -1 30.0 40.0 7"
+    images.write_text(f"{pose}\n{points}\n")
+    np.testing.assert_array_equal(read_any_file(images).pose.rotation, found.pose.rotation)
     images.write_text(images.read_text() * 2)
     with pytest.raises(InputError, match="contains 2 images"):
         read_any_file(images)

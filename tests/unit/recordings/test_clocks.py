@@ -355,3 +355,11 @@ def test_the_warnings_of_the_clocks_reach_the_recording(ros1, write, plain, jpeg
     with open_recording(write(ros1, rows)) as recording:
         codes = [warning.code for warning in recording.warnings]
     assert codes.count("clock-jumps") == 2
+
+
+def test_zero_stamps_stay_zero_when_the_others_are_moved():
+    receive_ns = np.arange(1, 6) * NS_PER_S + 10**18
+    header_ns = np.where(np.arange(5) == 2, 0, receive_ns)
+    moved = Stamps("/radar", receive_ns, header_ns).earlier(10**9)
+    assert moved.header_ns is not None
+    assert moved.header_ns.tolist() == [value and value - 10**9 for value in header_ns.tolist()]

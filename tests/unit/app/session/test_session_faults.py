@@ -314,3 +314,22 @@ def test_a_journal_that_can_no_longer_be_written_is_not_called_closed(folder, mo
     closed = session_file.close()
     assert closed.clicks == 2
     assert closed.fault.endswith("no longer be written")
+
+
+def test_a_replaced_file_is_on_disk_before_its_name_and_the_name_before_it_is_told(tmp_path, monkeypatch):
+    calls: list[str] = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+
+        def noted(*given, name=name, real=real, **named):
+            is_folder = name == "fsync" and stat.S_ISDIR(os.fstat(given[0]).st_mode)
+            calls.append("folder" if is_folder else name)
+            return real(*given, **named)
+
+        monkeypatch.setattr(os, name, noted)
+    folder = GuardedFolder(tmp_path / "session", create=True)
+    calls.clear()
+    folder.replace("journal.jsonl", b"{}")
+    folder.close()
+    assert calls[-2:] == ["replace", "folder"]
+    assert "fsync" in calls[:-2]

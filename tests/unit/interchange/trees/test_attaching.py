@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 from pytransform3d.urdf import UrdfTransformManager
 
+from benchmarks.simulated_pairs import SystematicErrors, simulate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.check.report import check
-from calib_core.interchange.exporting import attached_export
+from calib_core.interchange.exporting import attached_export, posed
 from calib_core.interchange.format import imported
+from calib_core.interchange.formats.registry import format_named
 from calib_core.interchange.importing import read_any
+from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles
@@ -74,3 +78,20 @@ def test_a_frame_that_is_not_in_the_tree_is_written_as_a_new_one(calibration, dr
     assert "--frame-id radar --child-frame-id front_optical" in written.data.decode()
     with pytest.raises(InputError, match="--tree is for formats that add a joint to a frame tree"):
         attached_export(calibration, "kitti", driver)
+
+
+def test_the_pose_is_for_the_returns_that_are_asked_for(calibration, driver):
+    """Of a radar that reports its azimuths 4 % too large."""
+    errors = SystematicErrors(azimuth_scale=0.04)
+    drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
+    solved = calibration_file(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
+    corrected = dataclasses.replace(solved, frames=calibration.frames)
+
+    def written(returns):
+        data = attached_export(corrected, "urdf", driver, returns=returns)
+        whole = read_tree([TreeFile(data.data, data.file_name), ECHO])
+        return whole.between("camera_color_optical_frame", "radar").as_matrix()
+
+    raw = posed(corrected, format_named("urdf"), "raw")[0].calibration.camera_from_radar.as_matrix()
+    np.testing.assert_allclose(written("raw"), raw, rtol=0, atol=1e-9)
+    assert np.abs(written(None) - raw).max() > 1e-4

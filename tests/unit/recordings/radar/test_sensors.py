@@ -437,6 +437,17 @@ def test_a_return_that_two_topics_report_counts_once_as_the_finer_one_has_it():
     assert both.alternative_of is None
 
 
+@pytest.mark.parametrize("first_is_ambiguous", [False, True])
+def test_the_alternatives_of_two_topics_stay_apart(first_is_ambiguous):
+    alternatives = replace(scans_of([(15.0, 0.0, 0.0), (15.0, 0.5, 0.0)]), alternative_of=np.array([0, 0]))
+    own = [(6.0, 0.1, 0.0), (6.0, -0.5, 0.0)] if first_is_ambiguous else [(6.0, 0.1, 0.0)]
+    first = scans_of(own)
+    first = replace(first, alternative_of=np.array([0, 0])) if first_is_ambiguous else first
+    both = merged([first, alternatives], [SPREAD, COARSE], [0, 1])
+    assert both.alternative_of is not None
+    assert both.alternative_of.tolist() == ([0, 0, 1, 1] if first_is_ambiguous else [-1, 0, 0])
+
+
 @pytest.mark.parametrize("other", [(6.2, 0.10, 0.0), (6.0, 0.25, 0.0), (6.0, 0.10, 0.5)])
 def test_returns_in_different_bins_stay_two(other):
     both = merged([scans_of([(6.0, 0.10, 0.0)]), scans_of([other])], [SPREAD, SPREAD], [0, 1])
