@@ -117,13 +117,15 @@ def clocks_apart(
     sound = fit is not None and agreeing > _SOUND_SHARE * len(pairs) and fit.noise_scale.max() < _SOUND_NOISE
     if len(pairs) - agreeing < _LEAST_APART:
         return []
-    rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
-    points_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])
     least = max(_LEAST_CLICKS, agreeing)
     deals = [one for one in _deals(np.array(times, dtype=np.int64), sound=sound) if len(one.clicks) >= least]
+    if not deals:
+        return []
+    rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
+    points_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])
     known = fit.camera_from_radar if fit is not None and sound else None
     as_given = 0.0 if fit is None else log_marginal_likelihood(pair_measurements(pairs, camera, options), fit)
-    best, chosen = as_given - np.log(_APART / max(len(deals), 1)), None
+    best, chosen = as_given - np.log(_APART / len(deals)), None
     facts: Facts = {}
     for tried in deals:
         clicks, seen = tried.clicks, tried.seen

@@ -103,13 +103,11 @@ def _another_image(camera: Camera) -> list[DataWarning]:
     modes = {name: _off_another(camera, ratio) for name, ratio in _ASPECT_RATIOS.items()}
     mode = min(modes, key=modes.__getitem__)
     better = float(share @ share) / OFF_MIDDLE**2 - modes[mode] > _BETTER
+    if not (better or share.max() > _FAR_OFF_MIDDLE):
+        return []
     if not (better or share.max() > _FARTHEST_OFF_MIDDLE):
         right, down = (off_px / size).tolist()
-        return (
-            [DataWarning("principal-point-off", {"right": right, "down": down})]
-            if share.max() > _FAR_OFF_MIDDLE
-            else []
-        )
+        return [DataWarning("principal-point-off", {"right": right, "down": down})]
     facts = {
         "principal_point_px": camera.matrix_px[:2, 2].tolist(),
         "width_px": camera.width_px,

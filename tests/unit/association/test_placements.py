@@ -202,7 +202,7 @@ def test_azimuths_that_are_shown_as_often_are_positions_of_one_placement_the_one
     assert placement.others_radar_m == pytest.approx(np.array([second]))
     first, other = placement.at_each
     assert other.position_radar_m == pytest.approx(second)
-    assert first.likely > other.likely
+    assert first.likely > other.likely > 0.0
     assert first.likely + other.likely == pytest.approx(1.0)
 
 

@@ -129,6 +129,7 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated):
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2]}, "sigma_polar: expected an array of 3"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.03, 0.5, 1.0]}, r"np\.deg2rad\(1\)"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.03, 0.5, 0.25]}, r"np\.deg2rad\(0\.5\)"),
     ],
 )
 def test_arrays_that_make_no_pairs_are_refused_with_a_clear_error(points, pixels, more, words):
