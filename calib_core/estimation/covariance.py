@@ -369,12 +369,18 @@ def smooth_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> tup
         shared = shape.T @ jacobian
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
         middles += [part * own + share * (shared.T @ shared) for part, share in levels]
-    independent = _log_likelihoods(residual, jacobian, prior, np.zeros((len(residual), 0)), [(1.0, 0.0)])
-    ratios = np.exp(np.minimum(np.concatenate(likelihoods) - independent, LARGEST_EXPONENT))
-    weights = np.concatenate([[1.0 - _SMOOTH_PROBABILITY], _SMOOTH_PROBABILITY * ratios / len(ratios)])
+    alone = [(independent, 0.0) for independent in _INDEPENDENT]
+    likelihoods.append(_log_likelihoods(residual, jacobian, prior, np.zeros((len(residual), 0)), alone))
+    *smooth, quiet = np.exp(np.minimum(np.array(likelihoods) - likelihoods[-1][0], LARGEST_EXPONENT))
+    weights = _SMOOTH_PROBABILITY * np.concatenate(smooth) / np.size(smooth)
+    weights = np.concatenate([[1.0 - _SMOOTH_PROBABILITY], weights])
     middle = np.tensordot(weights / weights.sum(), np.array(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
-    return np.asarray(inverse @ middle @ inverse), bool(weights[0] < (1.0 - _SHOWN) * weights.sum())
+    of_independent = (
+        weights[0] * quiet.mean()
+    )  # as quiet as beside smooth errors: a radar better than stated shows none
+    shown = of_independent < (1.0 - _SHOWN) * (of_independent + weights[1:].sum())
+    return np.asarray(inverse @ middle @ inverse), bool(shown)
 
 
 def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Values, np.ndarray]:

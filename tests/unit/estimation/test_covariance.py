@@ -272,6 +272,20 @@ def test_smooth_errors_raise_a_warning_and_independent_ones_do_not():
     assert "smooth-angle-errors" not in {warning.code for warning in plain.warnings}
 
 
+def test_a_radar_better_than_stated_shows_no_smooth_errors():
+    """Its residuals are quieter than the stated noise everywhere, not alike where placements are neighbors."""
+    simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging")
+    camera, pose = simulated.camera, simulated.camera_from_radar
+    exact = [
+        replace(pair, pixel_px=tuple(pixel), candidates=(replace(pair.candidates[0], position_radar_m=point),))
+        for pair, pixel, point in zip(
+            simulated.pairs, camera.project(pose @ simulated.points_radar_m), simulated.points_radar_m, strict=True
+        )
+    ]
+    found = calibrate_pairs(exact, camera).unwrap()
+    assert "smooth-angle-errors" not in {warning.code for warning in found.warnings}
+
+
 def test_under_smooth_errors_the_stated_uncertainty_turns_with_the_camera():
     upright = with_smooth_errors(1, 60)
     centre_px = upright.camera.matrix_px[:2, 2]
