@@ -2,7 +2,8 @@
 
 A pose can be solved from ranges in millimetres, from columns and rows in the wrong order or from another frame's axes, and its
 residuals may look good. What gives them away is their size: a reflector is clicked between a metre and a hundred from the
-radar, inside the image, and in front of the radar; a principal point is near the middle of the image.
+radar, inside the image, and in front of the radar, near ones in other rows than far ones; a principal point is near the middle
+of the image.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,8 @@ _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
 _PART_OF_IMAGE = 0.5
 _FAR_OFF_MIDDLE, _FARTHEST_OFF_MIDDLE = 0.05, 0.12
 """Of the width or height: KITTI, TUM RGB-D, EuRoC, nuScenes and Cityscapes publish up to 4.6 %, webcams up to 8 %."""
+_ONE_ROW = 0.005  # of the height, a choice: a reflector on a tripod that is moved stands within some centimeters
+_NEAR_AND_FAR = 1.5  # ratio of ranges, a choice: on the ground the rows would be as different
 # ratios of width to height that sensors and screens have, by name
 _ASPECT_RATIOS = {"4:3": 4.0 / 3.0, "16:9": 16.0 / 9.0, "3:2": 1.5, "16:10": 1.6, "5:4": 1.25, "1:1": 1.0}
 _BETTER, _NEAR_MIDDLE = 9.2, 4.0
@@ -50,6 +53,7 @@ def implausible_input(
         *_units(points_radar_m),
         *_camera_units(options),
         *_pixels(ids, pixels_px, camera),
+        *_one_row(points_radar_m, pixels_px, camera),
         *_another_image(camera),
         *_axes(points_radar_m),
     )
@@ -94,6 +98,15 @@ def _pixels(ids: Sequence[str], pixels_px: Points2, camera: Camera) -> list[Data
     if len(ids) < _LEAST_PAIRS or max(reach_u, reach_v) >= _PART_OF_IMAGE:
         return []
     return [DataWarning("pixels-suspected", {**image, "reach": (reach_u, reach_v)})]
+
+
+def _one_row(points_radar_m: Points3, pixels_px: Points2, camera: Camera) -> list[DataWarning]:
+    """Warn if near and far placements were clicked in one row: the camera is then taken to be as high as they are."""
+    range_m, rows_px = np.linalg.norm(points_radar_m, axis=1), pixels_px[:, 1]
+    alike = len(rows_px) >= _LEAST_PAIRS and float(rows_px.std()) < _ONE_ROW * camera.height_px
+    if not alike or range_m.max() < _NEAR_AND_FAR * range_m.min():
+        return []
+    return [DataWarning("one-row", {"row_px": float(rows_px.mean()), "spread_px": float(rows_px.std())})]
 
 
 def _another_image(camera: Camera) -> list[DataWarning]:

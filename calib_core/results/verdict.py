@@ -390,6 +390,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "weak-geometry",
         _FEW,
         "principal-point-off",
+        "one-row",
         "flat-radar",
         "choices-unused",
         "uncertain-association",

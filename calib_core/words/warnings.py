@@ -774,6 +774,19 @@ def principal_point_off(*, right: float, down: float) -> Remark:
     )
 
 
+def one_row(*, row_px: float, spread_px: float) -> Remark:
+    """Given when near and far placements were clicked in nearly one row of the image: the pairs then put the camera at their
+    height, whatever the radar says.
+
+    Could also be: a reflector on a tripod as high as the camera: then nothing is wrong.
+    """
+    return remark(
+        f"all clicks are within a few pixels of row {row_px:.0f} (spread {spread_px:.1f} px): that is right only if the "
+        "reflector was as high as the camera at every placement",
+        "make sure that the clicks are on the reflector, not on the horizon; place it at several heights",
+    )
+
+
 def radar_axes_suspected(*, side: str, behind: int, pairs: int) -> Remark:
     """Given when by the given axes the placements are beside the radar or behind it.
 
@@ -990,6 +1003,7 @@ SOLVER = by_code(
     no_consensus,
     nobody_confirmed,
     one_pair_decides,
+    one_row,
     pixels_suspected,
     placement_ranges,
     principal_point_off,

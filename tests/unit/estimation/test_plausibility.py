@@ -233,3 +233,13 @@ def test_a_part_of_an_image_and_a_board_calibration_are_asked_nothing(simulated)
     camera = with_principal_point(simulated.camera, 0.0, 0.2)
     known = replace(camera, covariance=CameraCovariance(("cx_px", "cy_px"), np.eye(2)))
     assert of_image(with_clicks_of(simulated, known)) == []
+
+
+def test_clicks_in_one_row_are_told(simulated):
+    """A guess at the horizon puts the camera at the placements' height, and no residual shows it."""
+    points, pixels = arrays(simulated)
+    guessed = np.column_stack([pixels[:, 0], np.random.default_rng(6).normal(540.0, 3.0, len(pixels))])
+    assert found_in(simulated, points, guessed)["one-row"]["row_px"] == pytest.approx(540.0, abs=2.0)
+    assert "one-row" not in found_in(simulated, points, pixels)
+    equally_far = points / np.linalg.norm(points, axis=1, keepdims=True) * 8.0
+    assert "one-row" not in found_in(simulated, equally_far, guessed)

@@ -206,6 +206,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
         },
     ),
     DataWarning("principal-point-off", {"right": 0.068, "down": -0.081}),
+    DataWarning("one-row", {"row_px": 540.2, "spread_px": 2.6}),
     DataWarning("placement-ranges", {"chosen": 3, "by_score": 17, "region_m": 1.0}),
     DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),
     DataWarning(
