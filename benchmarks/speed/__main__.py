@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.speed.board_search import measure_board_search
 from benchmarks.speed.channel import measure_channel
+from benchmarks.speed.checking import measure_checking
 from benchmarks.speed.paging import measure_page
 from benchmarks.speed.recordings import measure_recordings
 from benchmarks.speed.rows import page
@@ -27,6 +28,7 @@ def main() -> int:
             measure_serving(Path(scratch)),
             measure_channel(),
             measure_solving(),
+            measure_checking(Path(scratch)),
             measure_board_search(),
             measure_starting(sample_folder() / "rooftop"),
             measure_recordings(Path(scratch), large=large),

@@ -5,20 +5,18 @@ import os
 import re
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import psutil
 from playwright.sync_api import Page, sync_playwright
 
-from benchmarks.speed.rows import Row, Table, median_ms, section
+from benchmarks.speed.rows import Row, Table, earlier_version, median_ms, section
 from benchmarks.speed.starting import as_installed
 from calib_core.measurements import time_from_parts
 from calib_core.recordings import open_recording
@@ -88,13 +86,6 @@ def measure_page(scratch: Path) -> tuple[Table, ...]:
         return compared, sheet, beginning, _playing(opened)
 
 
-def _earlier(commit: str, scratch: Path) -> Path:
-    archive = subprocess.run(["git", "-C", str(_HERE), "archive", commit], check=True, capture_output=True).stdout
-    with tarfile.open(fileobj=BytesIO(archive)) as files:
-        files.extractall(scratch / commit, filter="data")
-    return scratch / commit
-
-
 def measure_sheet(scratch: Path) -> Table:
     """Open the contact sheet of 200 marks in both versions, one after the other; cut-outs are kept from the opening before."""
     file = sample_folder() / "rooftop" / "clicks.json"
@@ -109,7 +100,7 @@ def measure_sheet(scratch: Path) -> Table:
             marks.append({**click, "id": f"c{len(marks)}", "image_time": {"sec": sec, "nanosec": nanosec}})
     many = scratch / "many.json"
     many.write_text(json.dumps({**document, "clicks": marks}))
-    times_ms: dict[Path, dict[str, list[float]]] = {_earlier(_EARLIER_SHEET, scratch): {}, _HERE: {}}
+    times_ms: dict[Path, dict[str, list[float]]] = {earlier_version(_EARLIER_SHEET, scratch): {}, _HERE: {}}
     for number in range(_ROUNDS):
         for version, measured in times_ms.items():
             command = ["open", *_SAMPLE, "--clicks", str(many)] if number == 0 else ["open", *_SAMPLE]
@@ -138,7 +129,7 @@ def _against(what: str, before_ms: list[float], now_ms: list[float]) -> Row:
 
 def _compared(scratch: Path) -> Table:
     """Drag the same marks and step through the same frames in both versions, one after the other."""
-    earlier = _earlier(_EARLIER, scratch)
+    earlier = earlier_version(_EARLIER, scratch)
     command = ["open", *_SAMPLE, "--clicks", str(sample_folder() / "rooftop" / "clicks.json")]
     times_ms: dict[Path, dict[str, list[float]]] = {earlier: {}, _HERE: {}}
     for number in range(_ROUNDS):

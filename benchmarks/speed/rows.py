@@ -1,16 +1,28 @@
-"""The rows and tables of docs/speed.md."""
+"""The rows and tables of docs/speed.md, and the earlier versions that some compare with."""
 
 import os
 import platform
 import subprocess
+import tarfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Row", "Table", "median_ms", "page", "section"]
+__all__ = ["Row", "Table", "earlier_version", "median_ms", "page", "section"]
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def earlier_version(commit: str, scratch: Path) -> Path:
+    """Unpack the tree of a commit into a folder of its own, and return that."""
+    archive = subprocess.run(["git", "-C", str(_ROOT), "archive", commit], check=True, capture_output=True).stdout
+    with tarfile.open(fileobj=BytesIO(archive)) as files:
+        files.extractall(scratch / commit, filter="data")
+    return scratch / commit
 
 
 @dataclass(frozen=True, slots=True)
