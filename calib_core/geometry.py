@@ -25,6 +25,15 @@ def skew(vector: Vector3) -> Matrix33:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def skews(vectors: np.ndarray) -> np.ndarray:
+    """Return the same of many vectors (..., 3): (..., 3, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    found = np.zeros((*vectors.shape, 3))
+    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -z, y, -x
+    found[..., 1, 0], found[..., 2, 0], found[..., 2, 1] = z, -y, x
+    return found
+
+
 def rotation_exp(rotation_vector_rad: np.ndarray) -> np.ndarray:
     """Convert rotation vectors (..., 3) to matrices (..., 3, 3) by Rodrigues' formula, with its series near zero.
 
@@ -43,10 +52,7 @@ def _rotations_exp(vectors_rad: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(vectors_rad, axis=-1)[..., None, None]
     small = angle < _SMALL_ANGLE_RAD
     safe = np.where(small, 1.0, angle)
-    x, y, z = np.moveaxis(vectors_rad, -1, 0)
-    K = np.zeros((*vectors_rad.shape, 3))
-    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
-    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
+    K = skews(vectors_rad)
     first = np.where(small, 1.0, np.sin(safe) / safe)
     second = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
     return np.asarray(np.eye(3) + first * K + second * (K @ K))

@@ -96,7 +96,8 @@ def _at_other_widths(
     stopped: Callable[[], bool],
 ) -> tuple[tuple[DwellView, ...], Proposals]:
     """Propose at the width that what changed in the images has in common; what was found before if it may be chance."""
-    chance = chance_of(found[0], camera, options, widths=OTHER_WIDTHS, stopped=stopped)
+    known = found[1].chance
+    chance = chance_of(found[0], camera, options, widths=OTHER_WIDTHS, known=known, stopped=stopped)
     if chance is None or chance.probability < LEAST_CONFIDENCE:
         return found
     views = tuple(at_width(view, frames, chance.wider) for view in found[0])

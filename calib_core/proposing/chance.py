@@ -21,9 +21,8 @@ from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import refined_poses, rotation_consensus
 from calib_core.proposing.still_images import FrameSource
 
-OTHER_WIDTHS = (0.71, 1.0, 1.41, 2.0, 2.83)
-"""Of the width that is thought of, from small trihedrals to boards around them; a blob is found at a fifth more or less than its
-width."""
+OTHER_WIDTHS = (0.71, 1.41, 2.0, 2.83)
+"""Over the width that is thought of, from small trihedrals to boards around them; a blob is found at a fifth more or less."""
 _WIDTH_STEP = 1.15
 """Factor between the widths at which an image is searched."""
 _DEALS, _DRAWN = 40, 2000
@@ -88,6 +87,7 @@ def chance_of(
     *,
     confirmed: Sequence[ReflectorClick] = (),
     widths: Sequence[float] = (1.0,),
+    known: Chance | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Chance | None:
     """Find how well the dwells agree on one mounting, and how well wrong deals do; None if it is stopped.
@@ -98,12 +98,19 @@ def chance_of(
         options: of the calibration.
         confirmed: clicks that count.
         widths: that are tried, over the width that was thought of.
+        known: the same at widths that were tried before.
         stopped: asked before each deal.
     """
+    views = sorted(views, key=lambda view: (view.placement.start, view.placement.end))
     search = _Search(views, camera, options, confirmed, widths, {})
     wider, score = search.best(np.arange(len(views)))
-    by_chance = [search.best(images)[1] for images in _deals(apart_in_time(views)) if not stopped()]
-    return None if stopped() else Chance(wider, score, np.array(by_chance), bool(confirmed))
+    by_chance = np.array([search.best(images)[1] for images in _deals(apart_in_time(views)) if not stopped()])
+    if stopped():
+        return None
+    found = Chance(wider, score, by_chance, bool(confirmed))
+    if known is None:
+        return found
+    return replace(max(known, found, key=lambda one: one.score), by_chance=np.maximum(known.by_chance, by_chance))
 
 
 def at_width(view: DwellView, frames: FrameSource, wider: float) -> DwellView:

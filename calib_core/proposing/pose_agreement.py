@@ -21,7 +21,7 @@ from typing import Self
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Values, freeze
-from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.geometry import RigidTransform, rotation_exp, skews
 from calib_core.proposing.candidate_rays import CandidateRays
 from calib_core.proposing.dwell_views import DwellView, is_upright
 from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
@@ -303,9 +303,10 @@ def rotation_consensus(
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
     by_start: list[RoughPoses] = []
-    for centre in prior.starts_m:
-        rotations = _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))
-        scores = _rotation_scores(rays, prior, centre, rotations)
+    found = [
+        (centre, _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))) for centre in prior.starts_m
+    ]
+    for (centre, rotations), scores in zip(found, _rotation_scores(rays, prior, found), strict=True):
         kept = _best_apart(rotations, scores, most)
         centres = np.tile(centre, (len(kept), 1))
         by_start.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
@@ -334,27 +335,28 @@ def _from_two_dwells(
         odds = rays.odds[dwell, which]
         drawn = np.sort(rng.choice(len(dwell), _MOST_PAIRED, replace=False, p=odds / odds.sum()))
         dwell, which = dwell[drawn], which[drawn]
-    one, other = np.triu_indices(len(dwell), 1)
-    apart_rad = np.arccos(np.clip(directions @ directions.T, -1.0, 1.0))
-    wide = apart_rad[dwell[one], dwell[other]] > _LEAST_APART_RAD
-    one, other = one[wide], other[wide]
-    seen = rays.rays[dwell, which]
-    seen_rad = np.arccos(np.clip((seen[one] * seen[other]).sum(axis=1), -1.0, 1.0))
+    seen, thought = rays.rays[dwell, which], directions[dwell]
+    within = np.flatnonzero((seen * (thought @ prior.rotation.T)).sum(axis=1) > np.cos(MOST_TURNED_RAD))
+    dwell, which, seen, thought = dwell[within], which[within], seen[within], thought[within]
+    apart_rad = np.arccos(np.clip(directions @ directions.T, -1.0, 1.0))[dwell[:, None], dwell]
+    seen_rad = np.arccos(np.clip(seen @ seen.T, -1.0, 1.0))
     range_m = rays.polar[dwell, 0]
     slack = _TOLERANCE * (np.hypot(*rays.sigma_polar[dwell, 1:].T) + prior.centre_sigma_m[1] / np.maximum(range_m, 1.0))
-    agree = np.abs(seen_rad - apart_rad[dwell[one], dwell[other]]) < slack[one] + slack[other]
-    one, other = one[agree], other[agree]
-    rotations = _frames(seen[one], seen[other]) @ np.swapaxes(
-        _frames(directions[dwell[one]], directions[dwell[other]]), 1, 2
-    )
-    cosine = 0.5 * (np.einsum("hij,ij->h", rotations, prior.rotation) - 1.0)
-    near = np.flatnonzero(cosine > np.cos(MOST_TURNED_RAD))
+    agree = (apart_rad > _LEAST_APART_RAD) & (np.abs(seen_rad - apart_rad) < slack[:, None] + slack)
+    one, other = np.nonzero(np.triu(agree, 1))
+    rotations = _frames(seen[one], seen[other]) @ np.swapaxes(_frames(thought[one], thought[other]), 1, 2)
+    near = np.flatnonzero(_turned_cosine(rotations, prior.rotation) > np.cos(MOST_TURNED_RAD))
     most = min(tried, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
     if len(near) > most:
         odds = rays.odds[dwell, which]
         likely = odds[one[near]] * odds[other[near]]
         near = rng.choice(near, most, replace=False, p=likely / likely.sum())
     return np.asarray(rotations[near])
+
+
+def _turned_cosine(rotations: np.ndarray, by: np.ndarray) -> Values:
+    """Return the cosines (h,) of the angles between rotations (h, 3, 3) and one (3, 3)."""
+    return np.asarray(0.5 * (rotations.reshape(-1, 9) @ by.ravel() - 1.0))
 
 
 def _frames(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -365,23 +367,27 @@ def _frames(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.stack([middle, across, np.cross(middle, across)], axis=-1)
 
 
-def _rotation_scores(rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, rotations: np.ndarray) -> Values:
-    """Return the log-odds (h,) of each rotation over chance, with tolerances that do not depend on it."""
-    directions = _directions(rays, centre)
+def _rotation_scores(
+    rays: CandidateRays, prior: MountingPrior, by_start: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> list[Values]:
+    """Return the log-odds (h,) of rotations (h, 3, 3) over chance, with tolerances that do not depend on them, at each start."""
     scaled = rays.slopes * rays.sigma_polar[:, None, :] / np.maximum(rays.polar[:, 0], 1e-3)[:, None, None]
-    across = np.einsum("nkai,ij,njl->nkal", rays.tangents, prior.rotation, scaled) * _ROUGH
+    across = rays.tangents @ (prior.rotation @ scaled)[:, None] * _ROUGH
     lever_rad = _LEVER_M / np.maximum(rays.polar[:, 0], 0.3)
     own = rays.sigma_rad**2 + lever_rad[:, None] ** 2
     covariance = across @ np.swapaxes(across, -1, -2) + own[..., None, None] * np.eye(2)
     whitening = np.linalg.inv(np.linalg.cholesky(covariance))
-    height = np.linalg.det(whitening) / (2.0 * np.pi)
-    turned = np.einsum("hij,nj->hni", rotations, directions)
-    rows = whitening @ rays.tangents
-    forward = np.einsum("hni,nki->hnk", turned, rays.rays)
-    off = np.einsum("hni,nkai->hnka", turned, rows)
-    gain = rays.odds * height / rays.density
-    near = np.where(forward > 0.5, np.exp(-0.5 * (off**2).sum(axis=-1)), 0.0)
-    return np.log(rays.missing + (gain * near).sum(axis=-1)).sum(axis=-1)
+    gain = rays.odds * np.linalg.det(whitening) / (2.0 * np.pi) / rays.density
+    n, k = rays.odds.shape
+    axes = np.concatenate([rays.rays[:, :, None], whitening @ rays.tangents], axis=2)
+    axes = axes.transpose(0, 3, 2, 1).reshape(n, 3, 3 * k)
+    scores = []
+    for centre, rotations in by_start:
+        turned = (rotations @ _directions(rays, centre).T).transpose(2, 0, 1)
+        forward, right, down = np.split(turned @ axes, 3, axis=-1)
+        near = np.where(forward > 0.5, np.exp(-0.5 * (right**2 + down**2)), 0.0)
+        scores.append(np.log(rays.missing[:, None] + (near @ gain[..., None])[..., 0]).sum(axis=0))
+    return scores
 
 
 def _best_apart(rotations: np.ndarray, scores: Values, most: int) -> Indices:
@@ -394,7 +400,7 @@ def _best_apart(rotations: np.ndarray, scores: Values, most: int) -> Indices:
         kept.append(row)
         if len(kept) == most:
             break
-        cosine = 0.5 * (np.einsum("hij,ij->h", rotations, rotations[row]) - 1.0)
+        cosine = _turned_cosine(rotations, rotations[row])
         angle_rad = np.minimum(angle_rad, np.arccos(np.clip(cosine, -1.0, 1.0)))
     return np.array(kept, dtype=np.int64)
 
@@ -431,20 +437,23 @@ def refined_poses(rays: CandidateRays, prior: MountingPrior, rough: RoughPoses) 
 
 def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:
     """Predict every dwell with every pose, and weigh the candidates."""
-    points, by_scale = _true_positions(rays, poses)
+    m, (n, k) = len(poses), rays.odds.shape
+    points = _true_positions(rays, poses)
     away = points - poses.centres_radar_m[:, None]
     range_m = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 0.1)
-    turned = np.einsum("mij,mnj->mni", poses.rotations, away / range_m)
-    forward = np.einsum("mni,nki->mnk", turned, rays.rays)
+    turned = away / range_m @ np.swapaxes(poses.rotations, 1, 2)
+    forward = (rays.rays @ turned[..., None])[..., 0]
     safe = np.maximum(forward, _LEAST_FORWARD)[..., None]
-    off_rad = np.einsum("nkai,mni->mnka", rays.tangents, turned) / safe
-    by_point = np.einsum("nkai,mij->mnkaj", rays.tangents, poses.rotations) / (safe * range_m[:, :, None])[..., None]
-    crossed = np.cross(turned[:, :, None, None], rays.tangents[None]) / safe[..., None]
-    jacobian = np.concatenate([crossed, -by_point, np.einsum("mnkaj,mnjs->mnkas", by_point, by_scale)], axis=-1)
+    by_turn = np.concatenate([skews(-turned), np.broadcast_to(poses.rotations[:, None], (m, n, 3, 3))], axis=-1)
+    crossed, by_point = np.split((rays.tangents.reshape(n, 2 * k, 3) @ by_turn).reshape(m, n, k, 2, 6), 2, axis=-1)
+    off_rad = (rays.tangents.reshape(n, 2 * k, 3) @ turned[..., None]).reshape(m, n, k, 2) / safe
+    by_point = by_point / (safe * range_m[:, :, None])[..., None]
+    by_polar = (by_point.reshape(m, n, 2 * k, 3) @ rays.slopes).reshape(m, n, k, 2, 3)
+    by_scale = -by_polar[..., 1:] * rays.polar[:, None, None, 1:]
+    jacobian = np.concatenate([crossed / safe[..., None], -by_point, by_scale], axis=-1)
     factor = np.stack([np.ones_like(poses.noise), poses.noise, poses.noise], axis=-1)
-    spread = rays.slopes[None] * (rays.sigma_polar[None] * factor[:, None])[:, :, None]
-    across = np.einsum("mnkaj,mnjl->mnkal", by_point, spread)
-    covariance = across @ np.swapaxes(across, -1, -2) + (rays.sigma_rad**2)[None, ..., None, None] * np.eye(2)
+    across = by_polar * (rays.sigma_polar * factor[:, None])[:, :, None, None]
+    covariance = across @ np.swapaxes(across, -1, -2) + (rays.sigma_rad**2)[..., None, None] * np.eye(2)
     near, wide = densities(off_rad, covariance)
     odds = np.where(forward > _LEAST_FORWARD, rays.odds / rays.density, 0.0)
     gain = (near + wide) * odds
@@ -455,23 +464,26 @@ def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:
 
 def densities(off: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the density (...) of offsets (..., 2) with covariances (..., 2, 2): of the usual, and of those pulled aside."""
-    near = (1.0 - _WIDE_SHARE) * _normal(off, covariance)
-    return near, _WIDE_SHARE / _WIDE**2 * _normal(off / _WIDE, covariance)
+    squared = (off * (inverse(covariance) @ off[..., None])[..., 0]).sum(axis=-1)
+    height = 1.0 / (2.0 * np.pi * np.sqrt(_determinant(covariance)))
+    wide = _WIDE_SHARE / _WIDE**2 * height * np.exp(-0.5 / _WIDE**2 * squared)
+    return (1.0 - _WIDE_SHARE) * height * np.exp(-0.5 * squared), wide
 
 
-def _normal(off: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
-    determinant = a * c - b * b
-    x, y = off[..., 0], off[..., 1]
-    squared = (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
-    return np.asarray(np.exp(-0.5 * squared) / (2.0 * np.pi * np.sqrt(determinant)))
+def inverse(matrices: np.ndarray) -> np.ndarray:
+    """Return the inverses of symmetric matrices (..., 2, 2)."""
+    swapped = matrices[..., ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return np.asarray(swapped / _determinant(matrices)[..., None, None])
+
+
+def _determinant(matrices: np.ndarray) -> np.ndarray:
+    return np.asarray(matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] ** 2)
 
 
 def normal_equations(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> tuple[np.ndarray, np.ndarray]:
     """Return the information (m, 8, 8) of the dwells and the prior, and the gradient (m, 8) of the log-probability."""
     seen = expectation(rays, poses)
-    weight = np.linalg.inv(seen.covariance) * seen.weight[..., None, None]
-    weighted = np.einsum("mnkab,mnkbp->mnkap", weight, seen.jacobian)
+    weighted = (inverse(seen.covariance) * seen.weight[..., None, None]) @ seen.jacobian
     m = len(poses)
     rows = seen.jacobian.reshape(m, -1, 8)
     information = np.swapaxes(rows, 1, 2) @ weighted.reshape(m, -1, 8)
@@ -524,19 +536,19 @@ def _rotation_logs(rotations: np.ndarray) -> np.ndarray:
     return np.asarray(axis * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)[:, None])
 
 
-def _true_positions(rays: CandidateRays, poses: RoughPoses) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (m, n, 3) with the scales taken out, and their derivative by these (m, n, 3, 2).
+def _true_positions(rays: CandidateRays, poses: RoughPoses) -> np.ndarray:
+    """Return positions (m, n, 3) with the scales taken out.
 
     A radar without elevation reports the range to a plane below it as if it lay in that plane; the height is taken from the
     camera's, which stands next to it.
     """
-    by_scale = -rays.slopes[:, :, 1:] * rays.polar[:, None, 1:]
-    points = rays.positions_radar_m[None] + np.einsum("nis,ms->mni", by_scale, poses.scales)
-    if rays.is_flat:
-        height_m = poses.centres_radar_m[:, None, 2] - rays.positions_radar_m[None, :, 2]
-        range_m = np.maximum(rays.polar[None, :, 0], 1e-3)
-        points = points * np.sqrt(np.maximum(1.0 - (height_m / range_m) ** 2, _LEAST_SHARE_SQUARED))[..., None]
-    return points, np.broadcast_to(by_scale, (len(poses), *by_scale.shape))
+    scaled = rays.polar[:, 1:] * poses.scales[:, None]
+    points = rays.positions_radar_m - (rays.slopes[:, :, 1:] @ scaled[..., None])[..., 0]
+    if not rays.is_flat:
+        return np.asarray(points)
+    height_m = poses.centres_radar_m[:, None, 2] - rays.positions_radar_m[:, 2]
+    range_m = np.maximum(rays.polar[:, 0], 1e-3)
+    return np.asarray(points * np.sqrt(np.maximum(1.0 - (height_m / range_m) ** 2, _LEAST_SHARE_SQUARED))[..., None])
 
 
 _WIDE_ENOUGH_PX = 16.0

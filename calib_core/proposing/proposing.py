@@ -82,7 +82,7 @@ def proposals_of(
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
-    if chance is None and agreement is not None:
+    if chance is None:
         chance = chance_of(views, camera, options, confirmed=clicks)
     if chance is not None and agreement is not None:
         # deals are compared roughly: what full images do not repeat was chance
@@ -208,7 +208,7 @@ class _Judged:
         if not order or probability[order[0]] < LEAST_CONFIDENCE:
             return None
         candidates = tuple(self.candidate(i, k) for k in order)
-        confidence = float(min(probability[order[0]], 1.0))
+        confidence = round(float(min(probability[order[0]], 1.0)), 9)  # as many digits as any processor gives
         best = candidates[0]
         is_vague = best.sigma_px > _VAGUE_PX or (confidence < _UNSURE and not best.has_apex)
         reason = self.reason(i) if confidence < _WEAK else _VAGUE if is_vague else ""

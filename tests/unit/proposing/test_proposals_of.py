@@ -370,8 +370,8 @@ def _with_upright_thing(view: DwellView, pixel_px: np.ndarray) -> DwellView:
 @pytest.mark.slow
 def test_the_width_is_found_far_beyond_chance_where_images_and_radar_belong_together():
     few = Drawing(count=6)
-    own = chance_of(draw_views(4, few).views, CAMERA, OPTIONS, widths=OTHER_WIDTHS)
-    other = chance_of(with_images_of(draw_views(4, few), draw_views(24, few)), CAMERA, OPTIONS, widths=OTHER_WIDTHS)
+    views, of_another = draw_views(4, few).views, with_images_of(draw_views(4, few), draw_views(24, few))
+    own, other = (chance_of(one, CAMERA, OPTIONS, widths=(1.0, *OTHER_WIDTHS)) for one in (views, of_another))
     assert own.probability > 0.9
     assert other.probability < 0.5
     assert own.score > max(own.by_chance.max(), other.score) + 5.0
