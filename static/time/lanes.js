@@ -6,7 +6,7 @@
 import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
 import { offers } from "../base/offers.js";
 import { clicks, emit, on, state, stateOf } from "../base/state.js";
-import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
+import { drawGaps, drawRuler, pixelsPerSecond, RULER, toFolded } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
@@ -24,11 +24,11 @@ const LARGE = 140;
 /** @typedef {CanvasRenderingContext2D} Context2D */
 /** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./ruler.js").Folding}} Axis */
 
-/** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
-export function laneBoxes(height) {
+/** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @param {boolean} [rows] whether placements lie below each other @returns {Boxes} */
+export function laneBoxes(height, rows = false) {
   const image = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
   const radar = height >= 48 ? Math.min(24, Math.round(height * 0.15)) : 0;
-  const placements = Math.max(9, Math.min(20, Math.round(height * 0.15)));
+  const placements = Math.max(9, Math.min(20, Math.round(height * 0.15))) * (rows ? 1.5 : 1);
   const bottom = height - lanes.bottom;
   const radarBottom = bottom - (image ? image + lanes.gap : 0);
   const clicksBottom = radarBottom - (radar ? radar + lanes.gap : 0);
@@ -48,7 +48,8 @@ export function laneBoxes(height) {
 export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
-  const boxes = laneBoxes(height);
+  const rows = rowsOf(state.placements);
+  const boxes = laneBoxes(height, rows.some(({ of }) => of() > 1));
   lanes.left = 6.7 * smallPx();
   pen.save();
   pen.beginPath();
@@ -61,7 +62,6 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
   const sure = offers.confidences();
-  const rows = rowsOf(state.placements);
   const { top, bottom } = boxes.placements;
   state.placements.forEach((placement, index) => {
     const { row, of } = rows[index];
@@ -74,6 +74,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
     pen.fillRect(Math.round(pointer), RULER, 1, height - RULER);
   }
   drawCursor(pen, height, axis.toX(state.seconds[state.cursor] ?? 0));
+  drawOverview(pen, width, height, axis);
   pen.restore();
   drawNames(pen, boxes);
 }
@@ -132,7 +133,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   pen.setLineDash([]);
   if (sure) {
     pen.fillStyle = themeColour("accent");
-    pen.fillRect(left + 1, bottom - 3, Math.max(2, (wide - 2) * sure), 3);
+    pen.fillRect(left + 1, bottom - 2.5, Math.max(2, (wide - 2) * sure), 2.5);
   }
   if (wide < 15 || height < 9) return;
   pen.font = smallFont(1, "600");
@@ -249,6 +250,21 @@ function drawCursor(pen, height, x) {
   pen.lineTo(x + 0.5, RULER + 3);
   pen.closePath();
   pen.fill();
+}
+
+/** While a part is shown: all placements below it, with the part in a frame. @param {Context2D} pen @param {number} width @param {number} height @param {Axis} axis */
+function drawOverview(pen, width, height, { from_s, to_s, folding }) {
+  const [room, last] = [width - lanes.left - lanes.right, toFolded(folding, state.seconds[state.seconds.length - 1])];
+  const at = (/** @type {number} */ seconds) => lanes.left + room * Math.min(1, Math.max(0, toFolded(folding, seconds) / last));
+  const [left, wide] = [at(from_s), at(to_s) - at(from_s)];
+  if (wide > 0.99 * room) return;
+  pen.fillStyle = themeColour("surface");
+  pen.fillRect(lanes.left - 8, height - 6, width, 6);
+  pen.fillStyle = themeColour("accent");
+  for (const { start_s, end_s } of state.placements) pen.fillRect(at(start_s), height - 4, Math.max(1, at(end_s) - at(start_s) - 1), 2);
+  pen.lineWidth = 1;
+  pen.strokeStyle = themeColour("ink");
+  pen.strokeRect(left - 1, height - 5.5, Math.max(4, wide + 2), 5);
 }
 
 /** @typedef {{seconds: number[], grey_levels: number[], complete: boolean}} ImageChanges */

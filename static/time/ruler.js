@@ -55,9 +55,9 @@ const lastOf = ({ folding: { stretches } }) => stretches[stretches.length - 1].t
 
 /** @param {number} seconds @param {number} step [s] @param {boolean} long whether the recording has many minutes */
 function timeWords(seconds, step, long) {
-  if (long && step >= 1) return minutesText(seconds, 0);
-  if (seconds === 0) return "0 s";
-  return step < 1 ? seconds.toFixed(Math.ceil(-Math.log10(step))) : String(Math.round(seconds));
+  const places = Math.max(0, Math.ceil(-Math.log10(step)));
+  if (long) return minutesText(seconds, places);
+  return seconds === 0 ? "0 s" : seconds.toFixed(places);
 }
 
 /** A folded gap: hatched, with its length, upright where there is no room. @param {Context2D} pen @param {number} height @param {Axis} axis */

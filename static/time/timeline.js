@@ -1,7 +1,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { hideTip, showTip } from "../base/notices.js";
-import { clicks, nameOf, on, onPainted, state, stateOf } from "../base/state.js";
+import { clicks, nameOf, on, onPainted, state, stateOf, timeText } from "../base/state.js";
 import { changes, drawLanes, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
@@ -128,7 +128,7 @@ function stemNear(x, reach) {
 function explain(event) {
   const seconds = toSeconds(event.offsetX);
   const gap = gapsOf(folding).find(({ from, to }) => from < seconds && seconds < to);
-  const lines = gap ? [`No frames for ${lengthWords(gap.to - gap.from)}, from ${gap.from.toFixed(1)} to ${gap.to.toFixed(1)} s`] : aboutTime(seconds, event);
+  const lines = gap ? [`No frames for ${lengthWords(gap.to - gap.from)}, from ${timeText(gap.from, 1)} to ${timeText(gap.to, 1)}`] : aboutTime(seconds, event);
   showTip(lines.join("\n"), event.clientX, event.clientY - 10);
 }
 
@@ -137,7 +137,7 @@ const STATES = { marked: "clicked", guess: "a guess", open: "not clicked yet", d
 
 /** What the timeline shows at a time. @param {number} seconds @param {PointerEvent} event */
 function aboutTime(seconds, event) {
-  const lines = [`${seconds.toFixed(2)} s`];
+  const lines = [timeText(seconds, 2)];
   const click = stemNear(event.offsetX, REACH);
   if (click) lines.push(`${nameOf(click.id)} · ${click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px`}`);
   const number = state.placements.findIndex((placement) => placement.start_s <= seconds && seconds <= placement.end_s);
@@ -211,5 +211,5 @@ function label() {
   canvas.setAttribute("aria-valuemin", "0");
   canvas.setAttribute("aria-valuemax", String(Math.max(0, state.seconds.length - 1)));
   canvas.setAttribute("aria-valuenow", String(state.cursor));
-  canvas.setAttribute("aria-valuetext", `frame ${state.cursor + 1}, ${(state.seconds[state.cursor] ?? 0).toFixed(2)} s`);
+  canvas.setAttribute("aria-valuetext", `frame ${state.cursor + 1}, ${timeText(state.seconds[state.cursor] ?? 0, 2)}`);
 }

@@ -80,7 +80,7 @@ def test_placements_in_a_recording_with_long_gaps_are_wide_enough_to_be_hit(isla
     gap = (placed[0][1] + placed[1][0]) / 2
     page.page.mouse.move(box["x"] + gap, box["y"] + 50)
     page.until("!document.getElementById('tip').hidden")
-    assert page.text("#tip").startswith("No frames for 4")
+    assert page.text("#tip") == "No frames for 4 min, from 0:05.8 to 4:18.0"
     known = page.page.evaluate(
         "async () => { const { changes } = await import('/time/lanes.js'); const end = performance.now() + 30000;"
         "while (!changes.seconds.length && performance.now() < end) await new Promise((done) => setTimeout(done, 50));"
@@ -118,6 +118,24 @@ def test_the_folded_axis_is_monotone_and_has_an_exact_way_back(islands_page: Dri
             assert not inside.any()  # no frame is in a folded gap
         if not answer["gaps"]:
             assert np.allclose(drawn - drawn[0], asked_s - asked_s[0])  # nothing to fold: the axis is time itself
+
+
+def test_zoomed_in_a_strip_shows_all_placements_below_the_part_in_sight(page: Driver) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    box = page.page.locator("#timeline").bounding_box()
+    assert box is not None
+    assert placements_in_strip(page) == 0, "all of the recording is in sight"
+    page.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 30)
+    page.page.mouse.wheel(0, -900)
+    page.drawn()
+    assert placements_in_strip(page) == len(page.value("__cocalib.state.placements"))
+
+
+def placements_in_strip(page: Driver) -> int:
+    """Count the blue stretches in the lowest rows of the timeline, right of the names of the lanes."""
+    strip = page.pixels("#timeline")[-3:, 76:].astype(int)
+    is_blue = (strip[:, :, 0] > strip[:, :, 2] + 60).any(axis=0)
+    return int(np.count_nonzero(np.diff(is_blue.astype(int)) == 1))
 
 
 def test_times_of_a_long_recording_are_minutes_and_hours(page: Driver) -> None:
