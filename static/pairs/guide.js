@@ -32,11 +32,11 @@ export function startGuide() {
   guide.onclick = ({ target }) => target === guide.firstChild && guide.classList.toggle("whole"); // in a narrow window, a long text is folded
 }
 
-/** The focus stays where it is. @param {Key} key */
-function keyPart({ key, label, action, pair, frame, option }) {
+/** The focus stays where it is. @param {Key} key @param {boolean} only whether the line offers nothing else to do */
+function keyPart({ key, label, action, pair, frame, option }, only) {
   const parts = [...(key ? [make("kbd", "key", key)] : []), label];
   if (!action && !pair && !option && frame === undefined) return make("span", "", parts);
-  const button = make("button", action === "place-mark" ? "do primary" : "do", parts);
+  const button = make("button", action === "place-mark" || action === "export" || (only && action === "next-placement") ? "do primary" : "do", parts);
   button.onmousedown = (event) => event.preventDefault();
   button.onclick = () => (pair ? goToPair(pair) : frame !== undefined ? comeTo(frame) : option ? openOption(option) : act(actionNamed(action ?? "")));
   return button;
@@ -54,7 +54,8 @@ function drawGuide() {
   if (guide.dataset.said === JSON.stringify(words)) return; // said once
   guide.dataset.said = JSON.stringify(words);
   guide.classList.remove("whole");
-  guide.replaceChildren(...words.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
+  const only = words.filter((word) => typeof word !== "string").length === 1;
+  guide.replaceChildren(...words.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word, only))));
 }
 
 /** What to show before there is a frame. @returns {Words} */
@@ -123,7 +124,8 @@ function crossWords() {
 function returnWords() {
   const { rows, shown } = question() ?? { rows: [], shown: 0 };
   const answers = state.candidates?.rows ?? [];
-  return [`Which return? ${rows.map((row) => answers[row].answer).join(" | ")}`, { key: "C", label: "show another", action: "next-candidate" }, { key: "Enter", label: `keep ${answers[shown].range_m.toFixed(1)} m`, action: "place-mark" }];
+  const words = state.candidates?.asked.length ? `Which return? ${rows.map((row) => answers[row].answer).join(" | ")}` : `Return ${rows.indexOf(shown) + 1} of ${rows.length}: ${answers[shown].answer}`;
+  return [words, { key: "C", label: "show another", action: "next-candidate" }, { key: "Enter", label: `keep ${answers[shown].range_m.toFixed(1)} m`, action: "place-mark" }];
 }
 
 /** What may be wrong with a pair that disagrees: the mark, or the return. @param {Now} now @returns {Words} */
