@@ -14,6 +14,7 @@ from cocalib.session.state import Session
 from cocalib.view.model import PlacementState, View
 from cocalib.view.placement_states import SeenPlacements, placement_states, placements_of_clicks
 from cocalib.view.reference import Reference, shown_calibration
+from cocalib.view.wording import plain
 from cocalib.web.frames import Frame
 from cocalib.web.messages.space_messages import (
     RadarMap,
@@ -152,14 +153,14 @@ def _labels(sight: Sight) -> Iterator[SpaceLabel]:
         for pair in solved.pairs:
             if pair.id == sight.selected:
                 reported_m = float(np.linalg.norm(pair.point_radar_m))
-                words = f"{pair.id}: {reported_m:.2f} m, {_residual(pair)}"
+                words = f"{pair.id}: {reported_m:.1f} m, {_residual(pair)}"
                 yield SpaceLabel(words, _rounded(true_positions(solved, (pair,))[0]), "selected")
     if advice is not None and not (advice.best.may_stop or sight.view.verdict.done):
         yield SpaceLabel(f"next {advice.range_m:.1f} m", _rounded(advice.best.position_radar_m), "next")
 
 
 def _residual(pair: PairResult) -> str:
-    return f"{pair.distance_px:.1f} px" if np.isfinite(pair.distance_px) else "behind the camera"
+    return f"{plain(pair.distance_px)} px" if np.isfinite(pair.distance_px) else "behind the camera"
 
 
 def _pixel(pixel: Values) -> tuple[float, float] | None:
