@@ -118,7 +118,7 @@ function drawClick(pen, click) {
   const gap = (closeUp ? 10 : 3) * viewport.unit;
   if (closeUp) pen.globalAlpha = 0.9;
   if (hollow) outlined(pen, ink.click, 1.2, () => hollowCross(pen, x, y, arm, gap));
-  else outlined(pen, ink.click, closeUp ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], closeUp ? 1.4 : 2);
+  else outlined(pen, ink.click, 1.6, () => cross(pen, x, y, arm, gap), [], closeUp ? 1.4 : 2);
   pen.globalAlpha = 1;
 }
 
