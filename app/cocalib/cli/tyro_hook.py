@@ -110,7 +110,9 @@ def parse(
     """
 
     def read() -> Parsed:
-        config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
+        helped = bool({"-h", "--help"} & set(arguments))  # finding the texts of a help takes longer than all else here
+        quick = () if helped else (tyro.conf.HelptextFromCommentsOff,)
+        config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff, *quick)
         return tyro.cli(kind, prog=program, args=list(arguments), config=config, registry=_VALUES)
 
     def on_event(event: Any) -> None:
