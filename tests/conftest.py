@@ -1,5 +1,6 @@
 """Settings and fixtures for all tests."""
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
     from calib_core.interchange.calibration_file import CalibrationFile
 
 # The same examples on every run, without a time limit for each: a busy machine must not cause failures.
-settings.register_profile("cocalib", deadline=None, derandomize=True)
-settings.load_profile("cocalib")
+settings.register_profile("all", deadline=None, derandomize=True)
+settings.register_profile("quick", settings.get_profile("all"), max_examples=40)
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -30,10 +31,26 @@ sys.dont_write_bytecode = False
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+# Of what is imported and collected nothing is garbage: looking for it there, while that grows and then with every test, takes
+# a seventh of the collection of each worker.
+gc.disable()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Try fewer examples of each law where the slow tests are left out, too."""
+    settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "all")
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collection begin with what the tests make."""
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Start two workers more than there are processors: tests that drive a browser or start programs wait half of the time."""
-    return (os.cpu_count() or 1) + 2
+    """Start one worker more than there are processors: tests that drive a browser or start programs wait now and then."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.fixture(scope="session")

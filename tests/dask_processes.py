@@ -7,9 +7,12 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import psutil
-from distributed import Client, Nanny
+
+if TYPE_CHECKING:
+    from distributed import Nanny
 
 _ROOT = Path(__file__).resolve().parent.parent
 
@@ -37,12 +40,14 @@ def worker_process(
 
 def _wait_for_nannies(address: str) -> None:
     """Wait until the parents of the workers have noticed that these run: a worker killed before ends its parent, too."""
+    from distributed import Client
+
     with Client(address) as client:
         while set(client.run(_status, nanny=True).values()) != {"running"}:
             pass
 
 
-def _status(dask_worker: Nanny) -> str:
+def _status(dask_worker: "Nanny") -> str:
     return dask_worker.status.name
 
 

@@ -17,10 +17,7 @@ from calib_core.file_tag import OTHER_KIND, TAG, kind_of
 from cocalib.platform import files
 from cocalib.recorded_view import RecordedView
 from cocalib.rerun import write_view, writing
-from cocalib.rerun.unmoving import summary_text
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
-
-pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
 
 
 class Read:
@@ -49,6 +46,7 @@ class Read:
 
 @pytest.fixture(scope="module")
 def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RecordedView]:
+    pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
     with opened_view(tmp_path_factory.mktemp("made")) as shown:
         boxes = boxes_around(shown.recording, (3, 4))
         turned = shown.calibration.camera_from_radar.perturbed(np.array([0, 0, 0, 0, 0.03, 0]))
@@ -148,6 +146,8 @@ def test_boxes_end_with_the_last_annotated_frame(read, view):
 
 
 def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_image(read, view):
+    from cocalib.rerun.unmoving import summary_text
+
     assert read.one("summary", "TextDocument:media_type") == ["text/plain"]
     text = read.one("summary", "TextDocument:text")[0]
     assert text == summary_text(view)
