@@ -1,14 +1,19 @@
 """A real browser, the sample recording served in this process, and a fresh page for every test."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Playwright, expect, sync_playwright
 
+from calib_core.arrays import TimesNs
+from calib_core.measurements import RadarScans
+from calib_core.options import GatingOptions
 from calib_core.recordings import Recording, open_recording
+from cocalib.web.channel import hub
+from cocalib.web.channel.radar_survey import Survey, survey_of
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
@@ -84,8 +89,27 @@ def workspace(sample: Recording, tmp_path: Path) -> Iterator[Workspace]:
     opened.close()
 
 
+@pytest.fixture(scope="session")
+def survey_of_sample() -> Callable[..., Survey]:
+    """Search the sample's radar for placements once, whatever it is asked with, and not for each server of it."""
+    known: dict[GatingOptions, Survey] = {}
+
+    def survey(windows: Iterable[RadarScans], moments: TimesNs, options: GatingOptions) -> Survey:
+        if options not in known:
+            known[options] = survey_of(windows, moments, options)
+        return known[options]
+
+    return survey
+
+
 @pytest.fixture
-def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
+def server(
+    workspace: Workspace,
+    sample: Recording,
+    survey_of_sample: Callable[..., Survey],
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[RunningServer]:
+    monkeypatch.setattr(hub, "survey_of", survey_of_sample)
     running = start(workspace, sample, ServerOptions(port=0, token="test"))
     yield running
     running.close()

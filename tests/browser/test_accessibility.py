@@ -170,6 +170,7 @@ def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, tr
 
 
 @pytest.mark.no_3d_view
+@pytest.mark.slow
 def test_arrows_go_through_the_pairs_and_the_figures(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 5)
     user = page.page

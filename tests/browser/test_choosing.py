@@ -61,6 +61,7 @@ def drop(page: Driver, name: str, data: bytes) -> None:
     )
 
 
+@pytest.mark.slow
 def test_without_intrinsics_one_can_click_and_a_dropped_camera_file_gives_the_pose(
     recordings: Path, serve: Callable[..., ServedProcess], open_page: Callable[..., Driver]
 ) -> None:

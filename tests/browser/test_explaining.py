@@ -59,6 +59,7 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
     assert hintless == []
 
 
+@pytest.mark.slow
 def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 2)
     user = page.page

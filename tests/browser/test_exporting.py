@@ -95,6 +95,7 @@ def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibr
     assert read_any(solved.page.evaluate("() => navigator.clipboard.readText()")).format == "matrix"
 
 
+@pytest.mark.slow
 def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(solved: Driver) -> None:
     page, shown = solved.page, {}
     page.click("#tab-deliver")
@@ -127,6 +128,7 @@ def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(s
     expect(page.locator(f"{DIALOG} .ours tr").last).to_contain_text("qz")
 
 
+@pytest.mark.slow
 def test_the_check_point_is_said_and_marked_on_the_image_and_the_evidence_is_there_before_saving(
     solved: Driver,
 ) -> None:
@@ -215,6 +217,7 @@ def test_frames_and_file_get_the_names_that_the_user_types_and_a_wrong_one_is_re
     assert saved(solved, tmp_path).name == "front.sh"
 
 
+@pytest.mark.slow
 def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_reason(
     solved: Driver, tmp_path: Path
 ) -> None:
@@ -279,6 +282,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_images_are_
     expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
 
 
+@pytest.mark.slow
 def test_a_keyboard_is_enough(solved: Driver, tmp_path: Path) -> None:
     solved.page.keyboard.press("e")
     solved.page.keyboard.press("Tab")
@@ -332,6 +336,7 @@ def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
     expect(solved.page.locator(f"{DIALOG} .frames")).to_be_in_viewport()
 
 
+@pytest.mark.slow
 def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 4)
     page.page.click("#tab-deliver")

@@ -82,6 +82,7 @@ def test_a_page_that_missed_a_change_asks_for_a_whole_view(
     assert page.view == json.loads(encode(workspace.view))
 
 
+@pytest.mark.slow
 def test_after_a_calibration_the_page_has_what_a_new_page_gets_and_shows_the_same_frame_when_reloaded(
     page: Driver, workspace: Workspace, truth: dict[str, object]
 ) -> None:

@@ -30,6 +30,7 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     assert rule(page) == "next", "what is excluded is named no more"
 
 
+@pytest.mark.slow
 def test_a_click_beside_what_the_images_show_is_named_and_shown(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 5)
@@ -51,6 +52,7 @@ def rule(page: Driver) -> str:
     return str(page.page.get_attribute("#guide", "data-rule"))
 
 
+@pytest.mark.slow
 def test_of_four_pairs_with_a_wrong_one_one_more_placement_is_asked_for(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     wrong = {**truth["placements"][2], "pixel_px": [40.0, 40.0]}
@@ -59,6 +61,7 @@ def test_of_four_pairs_with_a_wrong_one_one_more_placement_is_asked_for(page: Dr
     assert rule(page) == "one-more"
 
 
+@pytest.mark.slow
 def test_a_maximum_range_that_leaves_all_returns_out_is_named_with_its_field(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 1)
     page.page.click("#menu-button")
@@ -71,6 +74,7 @@ def test_a_maximum_range_that_leaves_all_returns_out_is_named_with_its_field(pag
     assert page.value("document.activeElement.id") == "option-gating-max_range_m"
 
 
+@pytest.mark.slow
 def test_a_recording_without_placements_says_what_it_is_good_for(page: Driver) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.value("void (__cocalib.state.placements = [], __cocalib.state.view.verdict.key = '')")
@@ -154,6 +158,7 @@ def test_enter_opens_neither_the_cross_nor_the_menu_again(page: Driver) -> None:
     assert page.view["clicks"] == []
 
 
+@pytest.mark.slow
 def test_a_failure_of_the_papers_method_is_said_once(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 9)
     page.page.click("#menu-button")
@@ -175,6 +180,7 @@ def test_a_failure_of_the_papers_method_is_said_once(page: Driver, truth: Any) -
     assert page.page.get_attribute("#connection", "data-stage") == "unsolvable"
 
 
+@pytest.mark.slow
 def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth: Any) -> None:
     page.page.click("#tab-check")
     assert page.page.locator(".systematic").is_hidden()
@@ -203,7 +209,10 @@ def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth:
     assert page.page.get_by_label("Azimuth scale").input_value() == "0.02"
 
 
-@pytest.mark.parametrize("name", ["c({}".format, "a.*{}+".format, lambda number: str(21 - number)])
+@pytest.mark.parametrize(
+    "name",
+    ["c({}".format, pytest.param("a.*{}+".format, marks=pytest.mark.slow), lambda number: str(21 - number)],
+)
 def test_a_pair_that_does_not_fit_is_called_alike_everywhere_whatever_its_id(
     page: Driver, truth: Any, name: Callable[[int], str]
 ) -> None:

@@ -150,6 +150,7 @@ def test_at_200_percent_a_click_hits_its_pixel_and_moves_nothing_else(
     assert page.value("document.getElementById('image-pane').getBoundingClientRect().toJSON()") == before
 
 
+@pytest.mark.slow
 def test_dividers_keep_their_part_in_another_window_and_move_by_keys(page: Driver) -> None:
     bar = page.page.locator("#divider-x")
     bar.focus()
@@ -175,6 +176,7 @@ FULLY_IN_SIGHT = """(selector) => { const box = document.getElementById("page-ma
         .filter(({ top, bottom }) => top >= head - 1 && bottom <= Math.min(box.bottom, innerHeight) + 1).length; }"""
 
 
+@pytest.mark.slow
 def test_ten_pairs_or_four_and_six_returns_are_in_sight_beside_seven_warnings(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 12)

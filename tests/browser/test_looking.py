@@ -29,6 +29,7 @@ def test_the_page_says_what_was_found_and_that_nothing_can_be_clicked(page: Driv
     assert not page.page.is_visible("#marks")
 
 
+@pytest.mark.slow
 def test_keys_and_the_table_go_from_placement_to_placement(page: Driver) -> None:
     rows = page.page.locator("#page-mark [data-placement]")
     assert rows.count() == page.value("__cocalib.state.placements.length") >= 10
@@ -59,6 +60,7 @@ def test_the_view_from_above_explains_what_is_under_the_pointer(page: Driver) ->
     assert f"{page.value('__cocalib.state.placements[0].range_m'):.1f} m" in tip
 
 
+@pytest.mark.slow
 def test_returns_stay_as_long_as_chosen_and_playing_goes_through_the_scans(page: Driver) -> None:
     page.press("n", "n")
     page.until("__cocalib.state.look.index === __cocalib.state.placements[1].frame")

@@ -59,6 +59,7 @@ def test_the_export_says_that_the_server_is_gone_or_fails_and_tries_again(page: 
     page.complaints[:] = [text for text in page.complaints if not any(words in text for words in expected)]
 
 
+@pytest.mark.slow
 def test_a_page_whose_formats_did_not_come_asks_for_them_again(
     open_page: Callable[..., Driver], server: Any, truth: Any
 ) -> None:

@@ -116,6 +116,7 @@ def test_a_dismissed_placement_is_not_offered_until_it_is_undone(page: Driver) -
     page.until("__cocalib.state.view.dismissed.length === 0")
 
 
+@pytest.mark.slow
 def test_a_placement_takes_at_most_eight_keys(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placements.length >= 15")
     near = {page.frame_at(placement["best_image_time"]): placement for placement in truth["placements"]}

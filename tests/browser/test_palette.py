@@ -82,6 +82,7 @@ def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Dri
     assert recent[1:4] == ["Click uncertainty", "Pair 2", "Placement 7"]
 
 
+@pytest.mark.slow
 def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
     table = page.page.evaluate(
         """async () => {
@@ -136,6 +137,7 @@ def test_the_help_leads_to_the_documentation_and_its_search(page: Driver) -> Non
     assert complaints == []
 
 
+@pytest.mark.slow
 def test_what_needs_images_is_refused_with_the_reason(open_page: Callable[..., Driver], radar_only_server: Any) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look")
     opened(page)

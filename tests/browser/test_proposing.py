@@ -121,6 +121,7 @@ def off_px(page: Driver, images: Images) -> float:
     return float(np.hypot(offer["place"]["pixel_px"][0] - u_px, offer["place"]["pixel_px"][1] - v_px))
 
 
+@pytest.mark.slow
 def test_under_fingers_a_proposal_is_three_times_as_large_beside_the_whole_image(
     images: Images, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
@@ -349,6 +350,7 @@ def test_enter_before_any_proposal_goes_on_and_marks_nothing(
     assert page.view["clicks"] == []
 
 
+@pytest.mark.slow
 def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
     images: Images,
     proposing: RunningServer,

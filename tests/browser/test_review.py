@@ -170,6 +170,7 @@ def check_contours(page: Driver) -> None:
     page.until("document.getElementById('contour-chips').getAttribute('aria-label') === 'Uncertainty in the image'")
 
 
+@pytest.mark.slow
 def test_two_solutions_have_the_figures_of_the_check_command_and_both_are_drawn(
     reviewing: Driver, workspace: Workspace, tmp_path: Path
 ) -> None:
