@@ -107,6 +107,7 @@ def test_what_needs_no_command_imports_none(arguments):
     assert imported & {command.where.partition(":")[0] for command in COMMANDS.values()} == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [[*COMMANDS], [*reversed(COMMANDS)]], ids=["forwards", "backwards"])
 def test_a_command_imports_no_other_command(names):
     """In one of the two orders, whatever a command imports of another comes before the other's turn."""

@@ -162,7 +162,7 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
 
 def test_the_format_decides_which_returns_a_pose_is_for_unless_the_user_does(cocalib, tmp_path):
     errors = SystematicErrors(azimuth_scale=0.04, range_bias_m=0.05)
-    drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
+    drawn = simulate_pairs(14, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
     calibration = tmp_path / "calibration.json"
     cc.write_calibration(calibration, calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
     for name, wanted, raw in (("opencv", (), True), ("tf2", (), False), ("tf2", ("--for", "raw"), True)):

@@ -9,7 +9,16 @@ def interrupted(*_: object, **__: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("command", ["evaluate", "compared", "report", "rrd", "video", "propose", "auto"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "evaluate",
+        "report",
+        "video",
+        "auto",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("compared", "rrd", "propose")),
+    ],
+)
 def test_an_interrupt_leaves_no_file_and_no_traceback(cocalib, solved, clicks_file, tmp_path, monkeypatch, command):
     recording, clicks = solved.with_name("made.mcap"), ("--clicks", clicks_file)
     other = tmp_path / "other.json"

@@ -10,6 +10,7 @@ import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -150,8 +151,19 @@ _IN_THE_WAY: Mapping[str, Callable[[Path, Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("in_the_way", _IN_THE_WAY)
-@pytest.mark.parametrize("output", _OUTPUTS)
+_EVERY_KIND = ("solve.out", "export.out, maps", "export.out, mcap")
+"""An output of each way of writing: a text, files that belong together, a stream. With these everything in the way is tried
+quickly, with the others a file of each rule."""
+_EVERY_OUTPUT = ("hard link to an input", "foreign text")
+
+
+def _cases() -> Iterator[Any]:
+    for output, in_the_way in product(_OUTPUTS, _IN_THE_WAY):
+        quick = output in _EVERY_KIND or in_the_way in _EVERY_OUTPUT
+        yield pytest.param(output, in_the_way, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("output", "in_the_way"), list(_cases()))
 def test_nothing_else_is_written_over(output, in_the_way, here, cocalib):
     if output in _UNSOLVED and in_the_way in ("pipe that nobody reads", "full device"):
         pytest.skip("nothing is written")
@@ -195,7 +207,14 @@ def test_a_foreign_file_is_replaced_with_force_and_an_own_one_without(output, he
     assert not list(here.glob(".*"))
 
 
-@pytest.mark.parametrize("output", [output for output in _OUTPUTS if output not in _UNSOLVED])
+@pytest.mark.parametrize(
+    "output",
+    [
+        pytest.param(output, marks=() if output in {*_EVERY_KIND, *_STREAMED} else pytest.mark.slow)
+        for output in _OUTPUTS
+        if output not in _UNSOLVED
+    ],
+)
 def test_a_device_is_written_to_and_never_replaced(output, here, cocalib):
     out = here / f"null{_OUTPUTS[output][1]}"
     out.symlink_to("/dev/null")

@@ -105,6 +105,7 @@ def test_aed_and_cdsd_of_ppm_are_those_of_the_formulas(d1, d2):
         assert both(figures_of(calibration)) == pytest.approx(again(matrix, calibration), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(d1, d2):
     simulated, on_board = d2
     points, clicked = points_and_pixels(on_board)

@@ -177,7 +177,7 @@ class SessionLaws(RuleBasedStateMachine):
 
 
 TestSessionLaws = SessionLaws.TestCase
-TestSessionLaws.settings = settings(max_examples=40, stateful_step_count=25, deadline=None)
+TestSessionLaws.settings = settings(max_examples=25, stateful_step_count=25, deadline=None)
 
 
 def lived(taken: Sequence[Step]) -> list[tuple[Step, History]]:

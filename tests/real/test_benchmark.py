@@ -41,6 +41,7 @@ def test_other_files_than_the_checksum_is_of_are_refused(tmp_path):
 
 
 @pytest.mark.real
+@pytest.mark.slow
 def test_sixteen_clicks_are_judged_like_the_pairs_that_were_taken_from_them(shared_data: Path, tmp_path: Path):
     document = json.loads((shared_data / "real_pairs" / "heethesh_lidar_clicks_16.json").read_text(encoding="utf-8"))
     data = tmp_path / "lidar_camera_calibration" / "calibration_data"

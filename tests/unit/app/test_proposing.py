@@ -13,7 +13,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing import DwellView, ImageCandidate, Proposals, ViewProgress
+from calib_core.proposing import DwellView, ImageCandidate, Proposals, ViewProgress, chance
 from cocalib import proposing
 from cocalib.proposing import (
     ProposingJob,
@@ -23,10 +23,10 @@ from cocalib.proposing import (
     find_proposals,
     proposed_again,
 )
-from tests.drawn_views import draw_views
+from tests.drawn_views import Drawing, draw_views
 
 OPTIONS = CalibrationOptions()
-DRAWN = draw_views(3)
+DRAWN = draw_views(3, Drawing(count=12))
 VIEWS = DRAWN.views
 STANDS = tuple(view.placement for view in VIEWS)
 WISH = ProposingWish(DRAWN.camera, OPTIONS, STANDS)
@@ -68,6 +68,7 @@ class Finding:
 @pytest.fixture
 def finding(monkeypatch: pytest.MonkeyPatch) -> Finding:
     fake = Finding()
+    monkeypatch.setattr(chance, "_DEALS", 5)  # how far chance goes is not what is tested here
     monkeypatch.setattr("cocalib.proposing.find_proposals", fake.find)
     monkeypatch.setattr("cocalib.proposing.appearances_of", fake.look)
     monkeypatch.setattr("cocalib.proposing.with_appearance", fake.carry)

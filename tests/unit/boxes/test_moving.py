@@ -32,7 +32,7 @@ def scene_image(index: int, count: int, *, gain: float = 1.0, shadow: bool = Fal
     return np.clip(values, 0, 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("changes", ["steady", "brightness", "shadow"])
+@pytest.mark.parametrize("changes", [pytest.param("steady", marks=pytest.mark.slow), "brightness", "shadow"])
 def test_a_thing_that_moves_is_boxed_and_keeps_its_track(changes):
     count = 40
 

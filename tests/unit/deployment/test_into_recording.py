@@ -294,7 +294,10 @@ def test_a_calibration_of_other_images_is_refused(ros, rows, write):
         exported(write(ros, rows(ros)), calibration_file(SEEING.scaled(2)))
 
 
-@pytest.mark.parametrize("container", ["bag", "bag-bz2", "mcap", "mcap-zstd"])
+@pytest.mark.parametrize(
+    "container",
+    ["bag", "mcap-zstd", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bag-bz2", "mcap"))],
+)
 def test_of_a_damaged_recording_what_is_left_is_written_and_the_loss_is_said(container, rows, write):
     ros = Ros(1 if container.startswith("bag") else 2)
     path = write(ros, rows(ros, n=60), container)
@@ -331,6 +334,7 @@ class Sink(io.RawIOBase):
         return len(data)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_recording(rows, write):
     from calib_core.deployment import write_into_recording
 

@@ -398,7 +398,7 @@ def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[DataWarning]:
     return [one for one in outcome.warnings if one.code == "clock-bias-suspected"]
 
 
-@pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("ahead_s", [0.0, 1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(rooftop, ahead_s):
     assert clock_warnings(rooftop, ahead_s) == []
 

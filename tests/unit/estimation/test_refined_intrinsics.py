@@ -160,7 +160,7 @@ def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal):
     assert warning_remark(warning).action == CalibrateLens()
 
 
-@pytest.mark.parametrize("k1", [0.35, 0.4, 0.5, 0.6])
+@pytest.mark.parametrize("k1", [0.35, *(pytest.param(k1, marks=pytest.mark.slow) for k1 in (0.4, 0.5, 0.6))])
 def test_a_distortion_that_refining_does_not_reach_leaves_large_residuals(k1):
     simulated, given = draw_wrong_lens(TOLD, 0)
     found = solved(simulated.pairs, with_lens(given, k1=k1), TOLD.options)

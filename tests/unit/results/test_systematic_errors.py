@@ -75,8 +75,9 @@ def warning(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, 
 
 @pytest.mark.parametrize("options", [FREE, MEASURED])
 @pytest.mark.parametrize("scale", [0.04, -0.04])
-def test_a_scale_is_named_with_its_amount_and_its_sign(scale, options):
-    for seed in range(3):
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 3), marks=pytest.mark.slow)], ids=["one", "more"])
+def test_a_scale_is_named_with_its_amount_and_its_sign(scale, options, seeds):
+    for seed in seeds:
         simulated = drawn(seed, count=30)
         found = warning(scaled(simulated, 1.0 + scale), simulated.camera, options, "angle-scale")
         assert found is not None
@@ -113,8 +114,9 @@ def test_clicks_beside_the_phase_centre_contradict_a_measured_camera(offset_m):
 
 @pytest.mark.parametrize("options", [FREE, MEASURED])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_sound_sets_give_neither_warning(noise, options):
-    for seed in range(6):
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 6), marks=pytest.mark.slow)], ids=["one", "more"])
+def test_sound_sets_give_neither_warning(noise, options, seeds):
+    for seed in seeds:
         simulated = drawn(seed, noise)
         outcome = calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
         named = {"angle-scale", "camera-position-contradicted", "shared-error-suspected"}

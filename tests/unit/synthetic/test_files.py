@@ -25,7 +25,8 @@ from calib_core.synthetic.presets import PRESETS
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import OTHER_OFFSET_M
 
-OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
+_SIZE = {"width_px": 128, "height_px": 80, "camera_rate_hz": 1.0, "radar_rate_hz": 5.0}
+OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, seed=5, **_SIZE)
 
 
 @pytest.fixture(scope="module")

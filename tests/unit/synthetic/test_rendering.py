@@ -147,7 +147,7 @@ def test_at_rest_the_reflector_does_not_move_and_nobody_teleports(stage):
     assert np.linalg.norm(np.diff(carried, axis=0), axis=1).max() < 0.02 * 8.0
 
 
-@pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard"])
+@pytest.mark.parametrize("scene", ["rooftop", "field", pytest.param("aisle", marks=pytest.mark.slow), "checkerboard"])
 def test_every_scene_has_ground_below_and_light_above(scene):
     rig = random_rig(np.random.default_rng(2), camera=typical_camera(width_px=160, height_px=96))
     still = trace_still(scene_named(scene), rig)

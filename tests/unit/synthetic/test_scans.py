@@ -36,6 +36,7 @@ def test_interpolated_azimuths_leave_the_lattice():
     assert np.median(np.abs(32.0 * u - np.round(32.0 * u))) > 0.15
 
 
+@pytest.mark.slow
 def test_the_reflector_shows_in_nearly_every_scan_of_its_dwell_with_doppler_exactly_zero(
     session,
 ):
@@ -54,6 +55,7 @@ def test_without_clutter_and_person_hardly_anything_but_the_reflector_returns():
     assert len(window.points_radar_m) < 0.5 * len(window)
 
 
+@pytest.mark.slow
 def test_clutter_stays_and_a_walking_person_moves(session):
     bare = simulate(replace(SHORT, person=False))
     assert np.mean(bare.scans.doppler_mps == 0.0) > 0.9

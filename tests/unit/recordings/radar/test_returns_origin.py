@@ -60,7 +60,7 @@ def test_returns_are_taken_back_where_name_and_data_agree_and_nothing_is_silent(
 
 
 def test_what_the_user_says_decides():
-    scans, mount = scans_of("awr1843"), mount_of(CORNER)
+    scans, mount = scans_of("imaging"), mount_of(CORNER)
     assert decided(origin_of(scans, "radar_front", mount, stated="body"))[1:] == (True, ())
     assert decided(origin_of(moved(scans, mount), "base_link", mount, stated="sensor"))[1:] == (False, ())
     assert decided(origin_of(scans, "radar_front", stated="body"))[1:] == (False, OPEN)

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import TimeNs
-from calib_core.proposing import Proposals, ViewProgress
+from calib_core.proposing import Proposals, ViewProgress, chance
 from cocalib.session.events import ClickPlaced, PlacementDismissed
 from cocalib.session.state import RecordingFacts
 from cocalib.web.channel.proposing import ProposingService
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
 from cocalib.web.messages.outgoing import ProposalNews
 from cocalib.workspace import Workspace
-from tests.drawn_views import draw_views
+from tests.drawn_views import Drawing, draw_views
 from tests.unit.app.web.channel.desk import session_without_solver, visited
 
-DRAWN = draw_views(3)
+DRAWN = draw_views(3, Drawing(count=6))
 PLACEMENTS = tuple(view.placement for view in DRAWN.views)
 TIMES = np.array([int(view.image_time) for view in DRAWN.views])
 FACTS = RecordingFacts("a.bag", TIMES, DRAWN.camera.width_px, DRAWN.camera.height_px)
@@ -49,6 +49,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
         return DRAWN.views, Proposals(())
 
     monkeypatch.setattr("cocalib.proposing.find_proposals", find)
+    monkeypatch.setattr(chance, "_DEALS", 5)  # how far chance goes is not what is tested here
 
 
 class Cameras(Sensors):
