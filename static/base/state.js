@@ -196,6 +196,12 @@ export function minutesText(seconds, digits) {
   return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest}` : `${minutes}:${rest}`;
 }
 
+/** Three significant digits. @param {number} value */
+export const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));
+
+/** A residual: as many decimals as the server sends, one from 1 px on. @param {number} value px */
+export const residualText = (value) => `${value < 0.995 ? value : value < 99.95 ? value.toFixed(1) : digits(value)} px`;
+
 /** What a click is called within a sentence. @param {string} id */
 export const called = (id) => (nameOf(id) === id ? id : `#${nameOf(id)}`);
 

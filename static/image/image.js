@@ -5,7 +5,7 @@
 
 import { drawLayers } from "../base/layers.js";
 import { keepClear } from "../base/notices.js";
-import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, state } from "../base/state.js";
+import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, residualText, state } from "../base/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
@@ -184,7 +184,7 @@ function markWords(index) {
 
 /** @param {import("../messages.js").ClickRow} click */
 function oneMark(click) {
-  const residual = click.residual_px === null ? "" : `, ${click.residual_px.toFixed(1)} px from where the radar expects it`;
+  const residual = click.residual_px === null ? "" : `, ${residualText(click.residual_px)} from where the radar expects it`;
   const guessed = click.mark === "untouched" ? "a guess that does not count" : (STATES[click.state] ?? click.state);
   const selected = click.id !== "" && click.id === state.selected ? ", selected" : "";
   return `Mark ${nameOf(click.id)} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}${selected}: ${guessed}${residual}`;

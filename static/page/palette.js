@@ -3,7 +3,7 @@
 import { act, ACTIONS, keyNames, reasonAgainst, register } from "../base/actions.js";
 import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
-import { clicks, isClicked, nameOf, select, state, stateOf } from "../base/state.js";
+import { clicks, isClicked, nameOf, residualText, select, state, stateOf } from "../base/state.js";
 import { openOption, optionRows } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { goTo, nearestIndex, pause } from "../time/player.js";
@@ -206,7 +206,7 @@ function placements() {
 /** @returns {Entry[]} */
 function pairs() {
   return clicks().filter((click) => click.id).map((click) => {
-    const residual = click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px${click.state === "inlier" ? "" : `, ${click.state}`}`;
+    const residual = click.residual_px === null ? click.state : `${residualText(click.residual_px)}${click.state === "inlier" ? "" : `, ${click.state}`}`;
     return {
       id: `pair:${click.id}`,
       group: "Pair",

@@ -5,7 +5,7 @@
 
 import { act, actionNamed } from "../base/actions.js";
 import { make } from "../base/notices.js";
-import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state, stateOf } from "../base/state.js";
+import { called, clickIn, clicks, isDismissed, isOffered, on, placementAt, placementsAt, said, state, stateOf } from "../base/state.js";
 import { openOption } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { question } from "../image/candidates.js";
@@ -107,7 +107,7 @@ const RULES = [
   { name: "verdict", when: () => clicks().length, say: ({ verdict, open }) => [said(verdict.action), ...does(verdict), ...onward(open)] },
   { name: "searching", when: () => !state.placementsKnown, say: () => ["Looking for placements. You can click meanwhile."] },
   { name: "first", when: () => state.placements.length, say: ({ verdict }) => [said(verdict.action)] },
-  { name: "none", when: () => true, say: ({ verdict }) => [`${state.placementSummary}. ${said(verdict.action)}`, TOGETHER, JUDGE] },
+  { name: "none", when: () => true, say: () => [`${state.placementSummary}.`, TOGETHER, JUDGE] },
 ];
 
 /** @param {import("../base/state.js").Placement[]} open @returns {Words} */
@@ -133,7 +133,7 @@ function misfitWords({ click }) {
   const { id, frame } = /** @type {import("../messages.js").ClickRow} */ (click);
   const carried = state.placements.length > 0 && !placementsAt(frame).length ? " Was the reflector being carried?" : "";
   const others = state.candidates?.click === id && state.candidates.rows.length > 1;
-  return [`#${nameOf(id)} does not fit the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
+  return [`${called(id)} does not fit the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
 }
 
 /** The clicks beside which the images show the reflector. */
@@ -142,7 +142,7 @@ const slips = () => (state.proposals?.slips ?? []).filter((id) => clicks().some(
 /** @param {Now} now @returns {Words} */
 function slipWords({ click }) {
   const { id } = /** @type {import("../messages.js").ClickRow} */ (click);
-  return [`#${nameOf(id)} does not fit the images: the reflector is probably beside it. Is the mark on the inner corner?`, EXCLUDE];
+  return [`${called(id)} does not fit the images: the reflector is probably beside it. Is the mark on the inner corner?`, EXCLUDE];
 }
 
 /** @returns {Words} */

@@ -4,7 +4,7 @@ import { register, withImages } from "../base/actions.js";
 import { LARGE_PX, residualColour } from "../base/colours.js";
 import { showPage } from "../base/layout.js";
 import { make, shape } from "../base/notices.js";
-import { clickIn, clicks, nameOf, onPainted, select, stampKey, state, timeText } from "../base/state.js";
+import { clickIn, clicks, digits, nameOf, onPainted, residualText, select, stampKey, state, timeText } from "../base/state.js";
 import { withSelected } from "../image/actions.js";
 import { comeTo } from "../image/arriving.js";
 import { candidatesOf, choose } from "../image/candidates.js";
@@ -203,7 +203,7 @@ function line(click) {
   const bar = make("b", "", "");
   bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / LARGE_PX)}%`;
   bar.style.background = colour;
-  const residual = click.residual_px === null || click.state === "untouched" ? word(click) : `${residualLength(click.residual_px)} px`;
+  const residual = click.residual_px === null || click.state === "untouched" ? word(click) : residualText(click.residual_px);
   const excluded = click.state === "excluded";
   const act = make("input", "act", []);
   act.type = "checkbox";
@@ -225,12 +225,6 @@ function line(click) {
   row.dataset.hint = explain(click);
   return row;
 }
-
-/** As many decimals as the server sends, one from 1 px on. @param {number} value */
-const residualLength = (value) => (value < 0.995 ? String(value) : value < 99.95 ? value.toFixed(1) : digits(value));
-
-/** Three significant digits. @param {number} value */
-const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));
 
 /** @param {Click} click */
 const word = (click) => ({ unpaired: "no return", pending: "…", untouched: "guess" })[/** @type {string} */ (click.state)] ?? "–";

@@ -6,7 +6,7 @@
 import { ask, content } from "../base/asking.js";
 import { make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
-import { nameOf, stampOf, state } from "../base/state.js";
+import { nameOf, residualText, stampOf, state } from "../base/state.js";
 
 /** @typedef {import("./review.js").Row} Row */
 /** Side of a cut-out [px of the image], doubled until it is so many times as long as the residual. */
@@ -84,7 +84,7 @@ function fill(cell, { click, kind, right, down, length }, isReviewed) {
   const side = Math.min(MOST, SIDE * 2 ** Math.max(0, Math.ceil(Math.log2((WIDER * length) / SIDE))));
   const { sec, nanosec } = stampOf(click.frame);
   const source = `${sec}${String(nanosec).padStart(9, "0")},${click.u_px.toFixed(2)},${click.v_px.toFixed(2)},${side}`;
-  const words = `${nameOf(click.id)}: ${length.toFixed(1)} px${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;
+  const words = `${nameOf(click.id)}: ${residualText(length)}${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;
   const drawn = `${source} ${right.toFixed(1)} ${down.toFixed(1)} ${words}`;
   if (cell.dataset.drawn === drawn) return;
   cell.className = `crop ${kind}${isReviewed ? " reviewed" : ""}`;
@@ -92,7 +92,7 @@ function fill(cell, { click, kind, right, down, length }, isReviewed) {
   cell.setAttribute("aria-label", words);
   cell.onclick = () => arrive(click.id);
   const image = cell.querySelector("img");
-  cell.replaceChildren(...(image ? [image, arrow(side, right, down)] : []), make("span", "", [make("b", "", nameOf(click.id)), ` ${length.toFixed(1)} px${isReviewed ? " ✓" : ""}`]));
+  cell.replaceChildren(...(image ? [image, arrow(side, right, down)] : []), make("span", "", [make("b", "", nameOf(click.id)), ` ${residualText(length)}${isReviewed ? " ✓" : ""}`]));
   if (image?.dataset.source === source) return;
   arrows.set(cell, () => arrow(side, right, down));
   observer.observe(cell);

@@ -5,7 +5,7 @@
 
 import { degrees, sideways, upwards } from "../base/angles.js";
 import { ink, smallFont, smallPx, themeColour } from "../base/colours.js";
-import { clicks, nameOf, on, state } from "../base/state.js";
+import { clicks, nameOf, on, residualText, state } from "../base/state.js";
 import { spaceOptions } from "./options.js";
 import { drawAgain, hookInto, projection, shownThere } from "./viser_hook.js";
 
@@ -130,7 +130,7 @@ const isLate = (look) => spaceOptions.camera && look.index !== state.shown?.inde
 /** @param {string} id */
 function residualOf(id) {
   const residual = clicks().find((click) => click.id === id)?.residual_px ?? null;
-  return residual === null ? "" : `, residual ${residual.toFixed(1)} px`;
+  return residual === null ? "" : `, residual ${residualText(residual)}`;
 }
 
 /** The item at a point of the view. @param {number} x @param {number} y CSS px */

@@ -1,7 +1,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { hideTip, showTip } from "../base/notices.js";
-import { clicks, nameOf, on, onPainted, state, stateOf, timeText } from "../base/state.js";
+import { clicks, nameOf, on, onPainted, residualText, state, stateOf, timeText } from "../base/state.js";
 import { changes, drawLanes, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
@@ -139,7 +139,7 @@ const STATES = { marked: "clicked", guess: "a guess", open: "not clicked yet", d
 function aboutTime(seconds, event) {
   const lines = [timeText(seconds, 2)];
   const click = stemNear(event.offsetX, REACH);
-  if (click) lines.push(`${nameOf(click.id)} · ${click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px`}`);
+  if (click) lines.push(`${nameOf(click.id)} · ${click.residual_px === null ? click.state : residualText(click.residual_px)}`);
   const number = state.placements.findIndex((placement) => placement.start_s <= seconds && seconds <= placement.end_s);
   if (number >= 0) {
     const placement = state.placements[number];
