@@ -20,6 +20,7 @@ from calib_core.results import DataWarning
 _PLANE_ROUNDS = 6  # steps of reweighting: variances along the normal change little once it is about right
 _NORMAL_QUANTILE_99 = 2.33  # standard deviations, rounded up
 _WRONG_SHARE = 0.1  # of the inliers
+_LOW_RADAR_M = 0.5  # a choice: as far as a radar in a bumper may be below a reflector on a stand
 _CLEAR_SIGMAS, _VERY_CLEAR_SIGMAS = 2.0, 3.0  # of a height above the plane: of right and of mirrored axes (a choice)
 
 
@@ -29,7 +30,7 @@ class _Plane:
 
     Attributes:
         origin_m: (3,) their weighted mean.
-        axes: (3, 3) rows: two directions in the plane and its normal.
+        axes: (3, 3) rows: two directions in the plane and its normal, which points up.
         covariance: (3, 3) of its height at the origin [m] and its slopes along both directions.
         distances: (n,) squared distances of the placements from it, in standard deviations.
     """
@@ -56,7 +57,7 @@ class GroundSides:
     """Where radar and camera are relative to the plane of the placements.
 
     Attributes:
-        radar_m: signed height of the radar above the plane.
+        radar_m: height of the radar above the plane, by its own axes.
         radar_sigma_m: its standard deviation.
         camera_m: the same for the camera.
         camera_sigma_m: its standard deviation.
@@ -77,6 +78,11 @@ class GroundSides:
         """Whether they are clearly on different sides."""
         return self._sigmas() < -_VERY_CLEAR_SIGMAS
 
+    @property
+    def low_radar(self) -> bool:
+        """Whether the radar is so little below the plane that it may stand lower than the reflector."""
+        return -_LOW_RADAR_M < self.radar_m < 0.0
+
     def _sigmas(self) -> float:
         """Return how clear the less certain side is, negative if the sides differ."""
         radar, camera = self.radar_m / self.radar_sigma_m, self.camera_m / self.camera_sigma_m
@@ -96,7 +102,7 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
         return []
     if not heights_decide and not _is_measured(fit) and not _mirrored_on_rig(plane, fit):
         return []
-    if sides is not None and sides.opposite and not heights_decide:
+    if sides is not None and sides.opposite and not sides.low_radar and not heights_decide:
         return [_on_other_side(sides)]
     gain = fit.best.mirror_gain(fit.options)
     if gain > MIRRORED_GAIN:
@@ -122,7 +128,7 @@ def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
 
 
 def _on_other_side(sides: GroundSides) -> DataWarning:
-    return DataWarning("mirrored-axes", {"camera_below_m": abs(sides.camera_m), "radar_above_m": abs(sides.radar_m)})
+    return DataWarning("mirrored-axes", {"camera_m": sides.camera_m, "radar_m": sides.radar_m})
 
 
 def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
@@ -163,6 +169,7 @@ def _plane(fit: SolvedFit) -> _Plane:
         origin_m = (weights @ points) / weights.sum()
         offsets = points - origin_m
         axes = np.linalg.svd(offsets * np.sqrt(weights)[:, None], full_matrices=False)[2]
+        axes[2] *= 1.0 if axes[2, 2] >= 0.0 else -1.0
         weights = 1.0 / np.einsum("i,nij,j->n", axes[2], covariances, axes[2])
     distances = weights * (offsets @ axes[2]) ** 2
     excess = float(distances.sum()) / max(len(points) - 3, 1)

@@ -28,7 +28,7 @@ _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
 _PART_OF_IMAGE = 0.5
 _FAR_OFF_MIDDLE, _FARTHEST_OFF_MIDDLE = 0.05, 0.12
 """Of the width or height: KITTI, TUM RGB-D, EuRoC, nuScenes and Cityscapes publish up to 4.6 %, webcams up to 8 %."""
-_ONE_ROW = 0.005  # of the height, a choice: a reflector on a tripod that is moved stands within some centimeters
+_ONE_ROW = 0.005  # share of the height, a choice: a reflector on a tripod that is moved stands within some centimeters
 _NEAR_AND_FAR = 1.5  # ratio of ranges, a choice: on the ground the rows would be as different
 # ratios of width to height that sensors and screens have, by name
 _ASPECT_RATIOS = {"4:3": 4.0 / 3.0, "16:9": 16.0 / 9.0, "3:2": 1.5, "16:10": 1.6, "5:4": 1.25, "1:1": 1.0}

@@ -133,6 +133,7 @@ HELD_OUT_RATIO = 2.0
 """With a held-out error above this many times the fitted one, single pairs decide: the verdict is not good."""
 
 _CONTRADICTIONS = ("mirrored-axes", "no-pose", "no-consensus", "refinement-diverged")
+_NO_PAIR_HELPS = ("principal-point-off",)
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
 _FEW, _EXCLUDED = "few-pairs", "excluded-by-residual"
@@ -297,7 +298,7 @@ def _verdict_of_pose(
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
         return Verdict("good", _when_good(calibration, left), error=error)
-    warned = small and warning is not None and not left
+    warned = warning is not None and not left and (small or warning.code in _NO_PAIR_HELPS)
     action = FollowHint() if warned else _most_helpful(calibration, left)
     return Verdict("usable", action, error=error, cause=warning if warned else None, everything_clicked=left == 0)
 
@@ -378,6 +379,7 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "many-outliers",
         "residuals-too-large",
         "intrinsics-suspected",
+        "one-row",
         "shared-error-suspected",
         "clock-bias-suspected",
         "radar-axes-suspected",
@@ -390,7 +392,6 @@ CODES: dict[Consequence, tuple[str, ...]] = {
         "weak-geometry",
         _FEW,
         "principal-point-off",
-        "one-row",
         "flat-radar",
         "choices-unused",
         "uncertain-association",

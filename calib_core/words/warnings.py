@@ -210,9 +210,7 @@ def excluded_by_residual(*, ids: Sequence[str], aed_px: float, all_aed_px: float
     )
 
 
-def mirrored_axes(
-    *, log_likelihood_ratio: float = 0.0, camera_below_m: float = 0.0, radar_above_m: float = 0.0
-) -> Remark:
+def mirrored_axes(*, log_likelihood_ratio: float = 0.0, camera_m: float = 0.0, radar_m: float = 0.0) -> Remark:
     """Given when the pose puts radar and camera on different sides of the plane of the placements; or, where that does not
     apply, pairs and expected camera position are 200 times more likely with one radar axis mirrored.
 
@@ -224,7 +222,7 @@ def mirrored_axes(
         axes=option("radar_axes", "forward,right,up"),
     )
     action = SetOption("radar_axes", "forward,right,up")
-    if not camera_below_m:
+    if not camera_m:
         return remark(
             "pairs and expected camera position agree better with one radar axis mirrored (log-likelihood ratio "
             f"{log_likelihood_ratio:.1f}): the radar's axes look left-handed",
@@ -232,8 +230,8 @@ def mirrored_axes(
             action,
         )
     return remark(
-        f"the pose puts the camera {camera_below_m:.1f} m below the plane of the placements and the radar {radar_above_m:.1f} m "
-        "above it; with one radar axis mirrored, both are above: the radar's axes look left-handed",
+        f"the pose puts the camera {_height(camera_m)} the plane of the placements and the radar {_height(radar_m)} it; with one "
+        "radar axis mirrored, both are on one side: the radar's axes look left-handed",
         flip
         + say(
             "; if the sensors really are on different sides of the placements, turn {above} off",
@@ -243,6 +241,10 @@ def mirrored_axes(
     )
 
 
+def _height(height_m: float) -> str:
+    return f"{abs(height_m):.1f} m {'above' if height_m > 0.0 else 'below'}"
+
+
 def handedness_open() -> Remark:
     """Given when the sides are not clear, and mirrored axes explain the pairs nearly as well, or better.
 
@@ -250,8 +252,12 @@ def handedness_open() -> Remark:
     """
     return remark(
         "reflection ambiguity: a mirrored radar axis explains the pairs about as well, or puts radar and camera on one side of "
-        "the floor",
-        f"{_BY_TAPE}, or add placements at other heights (a tripod)",
+        "the placements",
+        say(
+            "{tape}, or add placements at other heights (a tripod); if the radar is lower than the reflector, turn {above} off",
+            tape=_BY_TAPE,
+            above=option("solving.sensors_above_placements"),
+        ),
         MeasureCameraPosition(),
     )
 
@@ -312,9 +318,17 @@ def clocks_apart(
     """
     away = "one placement" if abs(placements) == 1 else f"{abs(placements)} placements"
     later, ahead = ("later", "ahead of") if placements > 0 else ("earlier", "behind")
-    return remark(
+    agree = (
         f"{shifted_agreeing} of {shifted_clicks} clicks agree with what the radar saw {away} {later}, {agreeing} of {clicks} "
-        f"with what it saw at their time: its stamps seem to be about {abs(apart_s):.0f} s {ahead} the camera's"
+        "with what it saw at their time: "
+    )
+    if abs(apart_s) < 0.5:  # the times of a file that only tell the order
+        return remark(
+            agree + "the radar positions seem to be in the wrong rows",
+            f"write each click beside the radar position of its own placement, {away} {later} in the file",
+        )
+    return remark(
+        f"{agree}its stamps seem to be about {abs(apart_s):.0f} s {ahead} the camera's"
         + (f", as {scales} are" if scales else ""),
         say(
             "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt: {receive}; "
@@ -747,7 +761,7 @@ def pixels_suspected(
 
 def _off_middle(principal_point_px: Sequence[float], width_px: int, height_px: int, mode: str) -> Remark:
     u_px, v_px = principal_point_px
-    middle = f"; it is in the middle of a {mode} image of the same sensor" if mode else ""
+    middle = f"; it is near the middle of a {mode} image of the same sensor" if mode else ""
     return remark(
         f"the principal point ({u_px:.0f}, {v_px:.0f}) is far from the middle of the {width_px} x {height_px} image{middle}: the "
         "intrinsics seem to be of another image, and the pose turned accordingly",

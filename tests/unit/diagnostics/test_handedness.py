@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.simulated_pairs import FIELD, SimulatedPairs, simulate_pairs
+from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.calibration import calibrate_pairs
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
@@ -73,6 +75,26 @@ def test_sensors_above_and_below_the_placements_are_accused_only_under_the_assum
     assert handedness(simulated.pairs, simulated, apart(2.4)) == {"mirrored-axes"}
     without = CalibrationOptions(solving=SolvingOptions(nominal_camera_distance_m=2.4, sensors_above_placements=False))
     assert handedness(simulated.pairs, simulated, without) != {"mirrored-axes"}
+
+
+def test_a_radar_a_little_below_the_reflector_is_not_told_that_its_axes_are_mirrored():
+    """One in a bumper, with the reflector on a stand: whether an axis is mirrored stays open."""
+    rng, rotation = np.random.default_rng(86), np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    camera = simulate_pairs(20, rng=rng).camera
+    pose = RigidTransform(rotation, -rotation @ np.array([-1.4, -0.2, 0.8]))
+    polar = np.column_stack([rng.uniform(2.5, 9.0, 20), rng.uniform(-0.5, 0.5, 20), np.zeros(20)])
+    points = cartesian_from_polar(polar) + np.array([0.0, 0.0, 0.2])
+    measured = polar_from_cartesian(points) + rng.normal(0.0, 1.0, (20, 3)) * [0.02, np.deg2rad(0.2), np.deg2rad(0.3)]
+    pixels = camera.project(pose @ points) + rng.normal(0.0, 2.0, (20, 2))
+    pairs = pairs_from_arrays(cartesian_from_polar(measured), pixels)
+    found = {one.code for one in calibrate_pairs(pairs, camera, apart(1.6)).unwrap().warnings}
+    assert found & HANDEDNESS == {"handedness-open"}
+    lower = pairs_from_arrays(cartesian_from_polar(measured) + np.array([0.0, 0.0, 0.8]), pixels)
+    (told,) = (
+        one for one in calibrate_pairs(lower, camera, apart(1.6)).unwrap().warnings if one.code == "mirrored-axes"
+    )
+    assert told.facts["radar_m"] == pytest.approx(-1.0, abs=0.1)
+    assert told.facts["camera_m"] > 0.0
 
 
 @pytest.mark.parametrize("kind", ["elevation", "height", "zero", "rounded"])

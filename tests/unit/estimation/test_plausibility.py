@@ -222,6 +222,7 @@ def test_a_webcam_that_is_off_its_middle_stays_usable():
     assert verdict_on(calibration).level in ("usable", "good")
     (told,) = (one for one in calibration.warnings if one.code == "principal-point-off")
     assert (told.facts["right"], told.facts["down"]) == pytest.approx((0.068, -0.081), abs=0.001)
+    assert verdict_on(calibration).cause == told
     middle = with_clicks_of(simulated, with_principal_point(simulated.camera, 0.0, 0.0))
     assert "principal-point-off" not in {one.code for one in middle.warnings}
     assert stated_error(calibration).rotation_deg > stated_error(middle).rotation_deg
@@ -240,6 +241,8 @@ def test_clicks_in_one_row_are_told(simulated):
     points, pixels = arrays(simulated)
     guessed = np.column_stack([pixels[:, 0], np.random.default_rng(6).normal(540.0, 3.0, len(pixels))])
     assert found_in(simulated, points, guessed)["one-row"]["row_px"] == pytest.approx(540.0, abs=2.0)
+    told = calibrate_pairs(pairs_from_arrays(points, guessed), simulated.camera).unwrap()
+    assert verdict_on(told).level in ("coarse", "contradictory")
     assert "one-row" not in found_in(simulated, points, pixels)
     equally_far = points / np.linalg.norm(points, axis=1, keepdims=True) * 8.0
     assert "one-row" not in found_in(simulated, equally_far, guessed)
