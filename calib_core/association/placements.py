@@ -61,6 +61,7 @@ class Dwell:
         keys: (k,) numbers of those returns that have alternatives, which these share; ascending.
         listed_first: share of its returns that the radar lists first among their alternatives.
         first_listed_radar_m: (3,) median of those that are listed first in their place.
+        first_listed_span: stamps between which returns are listed first there without a break: other azimuths may take turns.
         others_radar_m: (a, 3) further positions that the same returns may have.
     """
 
@@ -78,6 +79,7 @@ class Dwell:
     keys: Indices
     listed_first: float
     first_listed_radar_m: Vector3
+    first_listed_span: tuple[TimeNs, TimeNs]
     others_radar_m: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
 
     def is_alternative_of(self, other: "Dwell") -> bool:
@@ -208,7 +210,8 @@ def _likeliest(dwell: Dwell, dwells: Sequence[Dwell]) -> Dwell:
     if len(shown) <= len(others):
         return shown[0]
     if shown[0].listed_first < _LISTED_LAST:
-        shown.insert(0, replace(shown[0], position_radar_m=shown[0].first_listed_radar_m))
+        best, (start, end) = shown[0], shown[0].first_listed_span
+        shown.insert(0, replace(best, position_radar_m=best.first_listed_radar_m, start=start, end=end))
     apart = [one for i, one in enumerate(shown) if not any(_is_near(one, other, _SAME_RETURN) for other in shown[:i])]
     return replace(shown[0], others_radar_m=np.array([one.position_radar_m for one in apart[1:]]).reshape(-1, 3))
 
@@ -444,7 +447,7 @@ def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> Dwell | None:
     members = rows[:0]
     span: tuple[int, int] | None = None
     for _ in range(2):  # the second time around the median of the dwell itself
-        members = rows[(np.abs(grid.cosines[rows] - centre) <= grid.reach).all(axis=1)]
+        members = _members(grid, rows, centre)
         span = _span(grid, members, float(np.median(seed_times_s)))
         if span is None:
             return None
@@ -453,6 +456,11 @@ def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> Dwell | None:
     if span is None or grid.times_s[span[1]] - grid.times_s[span[0]] < min_dwell_s:
         return None
     return _checked_dwell(grid, members, span)
+
+
+def _members(grid: _Grid, rows: Indices, centre: Vector3) -> Indices:
+    """Return the rows within reach of direction cosines (3,)."""
+    return rows[(np.abs(grid.cosines[rows] - centre) <= grid.reach).all(axis=1)]
 
 
 def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | None:
@@ -501,9 +509,16 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
     range_m = float(np.linalg.norm(position_radar_m))
     keys = np.unique(grid.key[mine][grid.key[mine] >= 0])
     first_listed = grid.first_points_radar_m[np.searchsorted(grid.first_keys, keys)]
+    first_radar_m = np.median(first_listed, axis=0) if len(keys) else position_radar_m
+    first = direction_cosines(first_radar_m)
+    at_first = _members(grid, grid.around(np.floor(first / grid.cell).astype(np.int64)), first)
+    as_listed = grid.listed_first[at_first] & (grid.key[at_first] >= 0)
+    at_first = at_first[as_listed & ~(grid.snr_db[at_first] < strong_db - _WEAKER_DB)]
+    first_span = _span(grid, at_first, float(np.median(grid.times_s[grid.scan[mine]]))) or span
+    start, end, first_start, first_end = (TimeNs(int(grid.times_ns[scan])) for scan in (*span, *first_span))
     return Dwell(
-        start=TimeNs(int(grid.times_ns[span[0]])),
-        end=TimeNs(int(grid.times_ns[span[1]])),
+        start=start,
+        end=end,
         position_radar_m=position_radar_m,
         presence=presence,
         presence_outside=presence_outside,
@@ -516,7 +531,8 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
         keys=keys,
         listed_first=float(grid.listed_first[mine].mean()),
-        first_listed_radar_m=np.median(first_listed, axis=0) if len(keys) else position_radar_m,
+        first_listed_radar_m=first_radar_m,
+        first_listed_span=(min(start, first_start), max(end, first_end)),
     )
 
 

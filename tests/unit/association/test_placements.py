@@ -216,6 +216,20 @@ def test_the_azimuth_listed_first_is_taken_where_clutter_hides_it_at_other_times
     assert placement.position_radar_m == pytest.approx(REFLECTOR, abs=0.02)
 
 
+def test_an_azimuth_that_takes_turns_with_another_does_not_say_how_long_the_one_listed_first_stands():
+    """The one listed first is no dwell of its own, nor is the second alternative: clutter hides them at other times."""
+    early, late = (6.0, -2.0, -0.8), (5.0, 3.5, -0.8)
+    parts = [
+        scans_of_two_types({0: (REFLECTOR, early), 1: (REFLECTOR, early)}, start_s=20.0, end_s=25.0),
+        scans_of_two_types({0: (REFLECTOR, late), 1: (REFLECTOR, late)}, start_s=25.1, end_s=30.0),
+        scans_with([(a, b, place, 20.0) for a, b in ((0.0, 19.0), (31.0, 60.0)) for place in (REFLECTOR, late)]),
+    ]
+    scans = [max((part.scan(i) for part in parts), key=lambda scan: len(scan.points_radar_m)) for i in range(600)]
+    (placement,) = find_placements(RadarScans.from_scans(scans), GatingOptions())
+    assert placement.position_radar_m == pytest.approx(REFLECTOR, abs=0.02)
+    assert (placement.start / NS_PER_S, placement.end / NS_PER_S) == pytest.approx((20.0, 30.0), abs=0.3)
+
+
 @pytest.mark.parametrize(("clutter_db", "seen"), [(8.0, True), (18.0, False)])
 def test_what_is_much_weaker_at_other_times_hides_no_placement(clutter_db, seen):
     placements = found_in((10.0, 20.0, REFLECTOR, 24.0), (42.0, 60.0, REFLECTOR, clutter_db))
