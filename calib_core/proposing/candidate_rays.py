@@ -23,6 +23,8 @@ _ALIKE, _LIKE = 13.0, 0.58
 
 They are those of a fit to simulated recordings, a little less sure.
 """
+_PRESENT = 0.9
+"""Share of the placements that are a reflector at one of their positions: nearly all when simulated, 8 of 12 on real scenes."""
 _LEAST_MISSING = 0.03
 _CLICK_IS_RIGHT = 0.85
 """Probability that a confirmed click is of a dwell, shared between those of its time: a weak reflector may give none."""
@@ -42,9 +44,10 @@ _GATHERED = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CandidateRays:
-    """Dwells and their candidates; dwells with fewer candidates than k are padded with odds 0.
+    """Dwells at each of n positions that their returns may have, and their candidates there, padded to k with odds 0.
 
     Attributes:
+        first: (d,) the first position of each dwell; its others follow.
         positions_radar_m: (n, 3) where the radar saw each dwell.
         polar: (n, 3) the same as range [m], azimuth and elevation [rad].
         slopes: (n, 3, 3) d position / d polar.
@@ -52,14 +55,14 @@ class CandidateRays:
         rays: (n, k, 3) unit rays of the candidates in the camera frame.
         tangents: (n, k, 2, 3) two directions across each ray.
         sigma_rad: (n, k) standard deviation of each candidate across its ray.
-        odds: (n, k) probability that the candidate is the reflector, before any pose is known.
-        missing: (n,) probability that none is.
-        likely: (n,) probability that the radar's position is the true one of its returns.
+        odds: (n, k) probability that the candidate is the reflector, and the position the true one, before any pose is known.
+        missing: (d,) probability that none is.
         density: (n, k) of wrong candidates around the candidate [1 / sr].
         click: (n, k) row of the confirmed click that the candidate is; -1 for none.
         is_flat: the radar measures no elevation.
     """
 
+    first: Indices
     positions_radar_m: Points3
     polar: Points3
     slopes: np.ndarray
@@ -69,7 +72,6 @@ class CandidateRays:
     sigma_rad: Points2
     odds: Points2
     missing: Values
-    likely: Values
     density: Points2
     click: Indices
     is_flat: bool
@@ -86,14 +88,39 @@ class CandidateRays:
             tangents=(n, k, 2, 3),
             sigma_rad=(n, k),
             odds=(n, k),
-            missing=(n,),
-            likely=(n,),
+            missing=(len(self.first),),
             density=(n, k),
         )
-        freeze(self, np.int64, click=(n, k))
+        freeze(self, np.int64, click=(n, k), first=(None,))
 
     def __len__(self) -> int:
         return len(self.missing)
+
+    def at_first(self) -> "CandidateRays":
+        """Return each dwell at its first position only."""
+        values = {name: getattr(self, name)[self.first] for name in _OF_POSITIONS}
+        return replace(self, first=np.arange(len(self)), click=self.click[self.first], **values)
+
+    def of_dwells(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums (..., d, k) of values (..., n, k) over the positions of each dwell: at most one of them is true."""
+        return np.add.reduceat(values, self.first, axis=-2)
+
+    def of_positions(self, values: np.ndarray) -> np.ndarray:
+        """Return values (..., d) of dwells at each of their positions (..., n)."""
+        return np.repeat(values, np.diff(self.first, append=len(self.odds)), axis=-1)
+
+
+_OF_POSITIONS = (
+    "positions_radar_m",
+    "polar",
+    "slopes",
+    "sigma_polar",
+    "rays",
+    "tangents",
+    "sigma_rad",
+    "odds",
+    "density",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +144,22 @@ def candidate_rays(
     """Collect the candidates of all dwells, and what is known of them before the dwells are compared.
 
     Args:
-        views: of all placements, each at one position; at least one.
+        views: of all placements, at least one.
         camera: the intrinsics.
         options: noise of the radar and of clicks.
         confirmed: clicks; one that lies within several dwells is a candidate of each.
     """
     below_db = weaker_db(views)
     shared_by = [sum(_is_within(click, view) for view in views) for click in confirmed]
-    choices = [_choices(view, below_db[i], options, confirmed, shared_by) for i, view in enumerate(views)]
+    placements = [view.placement.at_each for view in views]
+    choices = [
+        [replace(one, odds=one.odds * placement.likely) for one in own]
+        for view, at_each, db in zip(views, placements, below_db, strict=True)
+        for own in [_choices(view, db, options, confirmed, shared_by)]
+        for placement in at_each
+    ]
+    counts = [len(at_each) for at_each in placements]
+    first = np.append(0, np.cumsum(counts)[:-1])
     most = max(1, max(len(own) for own in choices))
     padded = [[*own, *[_Choice(0.0, 0.0, 1.0, 0.0)] * (most - len(own))] for own in choices]
     values = np.array([[(one.u_px, one.v_px, one.sigma_px, one.odds) for one in own] for own in padded])
@@ -135,20 +170,21 @@ def candidate_rays(
     rays = np.where(seen[..., None], rays, [0.0, 0.0, 1.0])
     per_px = np.where(seen, per_px, 1.0)
     odds = np.where(seen, odds, 0.0)
-    positions = np.array([view.placement.position_radar_m for view in views])
+    positions = np.array([placement.position_radar_m for at_each in placements for placement in at_each])
+    apart = np.repeat(np.repeat(apart_in_time(views), counts, axis=0), counts, axis=1)
     polar, flat = polar_from_cartesian(positions), is_flat(positions)
     return CandidateRays(
+        first=first,
         positions_radar_m=positions,
         polar=polar,
         slopes=cartesian_jacobian(polar),
-        sigma_polar=np.tile(_sigma_polar(options, flat=flat), (len(views), 1)),
+        sigma_polar=np.tile(_sigma_polar(options, flat=flat), (len(positions), 1)),
         rays=rays,
         tangents=_tangents(rays),
         sigma_rad=np.maximum(sigma_px, _LEAST_SIGMA_PX) * per_px,
         odds=odds,
-        likely=np.array([view.placement.likely for view in views]),
-        missing=np.maximum(1.0 - odds.sum(axis=1), _LEAST_MISSING),
-        density=_density(pixels, odds, apart_in_time(views), camera) / per_px**2,
+        missing=np.maximum(1.0 - np.add.reduceat(odds.sum(axis=1), first), _LEAST_MISSING),
+        density=_density(pixels, odds, apart, camera) / per_px**2,
         click=np.array([[one.click for one in own] for own in padded], dtype=np.int64),
         is_flat=flat,
     )
@@ -158,11 +194,6 @@ def _sigma_polar(options: CalibrationOptions, *, flat: bool) -> Values:
     noise = options.noise
     elevation_rad = OWN_SIGMA_RAD if flat else np.deg2rad(noise.sigma_elevation_deg)
     return np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), elevation_rad])
-
-
-def by_position(views: Sequence[DwellView]) -> tuple[DwellView, ...]:
-    """Return each view at each position that its returns may have."""
-    return tuple(replace(view, placement=placement) for view in views for placement in view.placement.at_each)
 
 
 def weaker_db(views: Sequence[DwellView]) -> Values:
@@ -194,9 +225,7 @@ def _choices(
         for row, click in enumerate(confirmed)
         if _is_within(click, view)
     ]
-    share = view.placement.likely / (
-        1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS)))
-    )
+    share = _PRESENT / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
     share *= 1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT)
     found = []
     for one, odds in zip(view.candidates, _odds(view.candidates), strict=True):

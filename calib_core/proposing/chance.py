@@ -14,7 +14,7 @@ from calib_core.arrays import Flags, Indices, Values, freeze
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.candidate_rays import apart_in_time, by_position, candidate_rays
+from calib_core.proposing.candidate_rays import apart_in_time, candidate_rays
 from calib_core.proposing.dwell_views import DwellView, with_blobs, with_seen_apexes
 from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.mounting_prior import mounting_prior
@@ -143,7 +143,7 @@ class _Search:
 
     def _score(self, images: Indices, wider: float) -> float:
         dealt = [self._seen(row, image, wider) for row, image in enumerate(images.tolist())]
-        rays = candidate_rays(by_position(dealt), self.camera, self.options, confirmed=self.confirmed)
+        rays = candidate_rays(dealt, self.camera, self.options, confirmed=self.confirmed)
         prior = mounting_prior(self.options, is_flat=rays.is_flat)
         rough = rotation_consensus(rays, prior, most=_REFINED, tried=_TRIED)
         nothing = float(np.log(rays.missing).sum())

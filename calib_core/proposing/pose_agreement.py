@@ -78,7 +78,7 @@ class Expectation:
         covariance: (m, n, k, 2, 2) of it by the noise of radar and image.
         probability: (m, n, k) that the candidate is the reflector, given the pose.
         weight: (m, n, k) of its offset in a fit: the probability, less for what lies aside.
-        log_odds: (m, n) of each dwell over chance.
+        log_odds: (m, d) of each dwell over chance.
     """
 
     off_rad: np.ndarray
@@ -110,8 +110,8 @@ class PoseAgreement:
         score: logarithm of how much better it explains the candidates than chance.
         rival_score: the same of the best pose that differs clearly; 0 if there is none.
         noise: factor on the stated noise of the radar's angles that the dwells show.
-        probability: (n, k) that each candidate is the reflector, judged by the other dwells.
-        off_sigma: (n, k) distance of each candidate from where the other dwells predict it, in standard deviations.
+        probability: (d, k) that each candidate is the reflector, judged by the other dwells.
+        off_sigma: (d, k) distance of each candidate from where the other dwells predict it, in standard deviations.
         share: of the dwells that have candidates, how many agree on the pose.
         rival_share: the same for the rival.
         trials: how many rotations were compared.
@@ -132,7 +132,7 @@ class PoseAgreement:
 
     @property
     def likeliest(self) -> Indices:
-        """The most probable candidate of each dwell (n,)."""
+        """The most probable candidate of each dwell (d,)."""
         return np.argmax(self.probability, axis=1)
 
     @property
@@ -149,7 +149,7 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
         prior: of the mounting.
         most: how many rough rotations are refined.
     """
-    if int((rays.odds > 0.0).any(axis=1).sum()) < _LEAST_DWELLS:
+    if int((rays.odds[rays.first] > 0.0).any(axis=1).sum()) < _LEAST_DWELLS:
         return None
     rough = rotation_consensus(rays, prior, most=most)
     if not len(rough):
@@ -174,7 +174,7 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
 
 
 def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> Points2:
-    """Return the probability of each candidate (n, k) by the poses that clicks and mounting leave open.
+    """Return the probability of each candidate (d, k) by the poses that clicks and mounting leave open.
 
     Each click bounds rows and columns at every range.
 
@@ -186,7 +186,9 @@ def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> Points2:
     """
     is_click = rays.click >= 0
     only = replace(rays, odds=np.where(is_click, rays.odds, 0.0))
-    only = replace(only, missing=np.maximum(1.0 - only.odds.sum(axis=1), 1.0 - is_click.any(axis=1)))
+    only = replace(
+        only, missing=np.maximum(1.0 - rays.of_dwells(only.odds).sum(axis=1), ~is_click[rays.first].any(axis=1))
+    )
     poses = _from_first_click(only, prior)
     for _ in range(2 * _STEPS):
         poses = _stepped(only, prior, poses)
@@ -194,6 +196,7 @@ def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> Points2:
     seen = expectation(rays, poses)
     left_open = np.einsum("mnkap,mpq,mnkbq->mnkab", seen.jacobian, np.linalg.inv(information), seen.jacobian)
     gain = sum(densities(seen.off_rad, seen.covariance + left_open)) * rays.odds / rays.density
+    gain = rays.of_dwells(gain)
     total = rays.missing + gain.sum(axis=-1)
     off, precision = _prior_offsets(prior, poses)
     scores = np.log(total).sum(axis=1) - 0.5 * (precision * off**2).sum(axis=1)
@@ -244,26 +247,28 @@ def _differs(rays: CandidateRays, poses: RoughPoses, best: int) -> Flags:
 
 
 def _judged_by_others(rays: CandidateRays, prior: MountingPrior, pose: RoughPoses) -> tuple[Points2, Points2]:
-    """Return the probability of each candidate (n, k) under the pose of the other dwells, and its distance from it."""
+    """Return the probability of each candidate (d, k) under the pose of the other dwells, and its distance from it."""
     seen = expectation(rays, pose)
     off_rad, jacobian, covariance = seen.off_rad[0], seen.jacobian[0], seen.covariance[0]
     information = normal_equations(rays, prior, pose)[0][0]
-    weight = np.linalg.inv(covariance) * seen.weight[0][..., None, None]
-    own = np.einsum("nkap,nkab,nkbq->npq", jacobian, weight, jacobian)
-    pull = np.einsum("nkap,nkab,nkb->np", jacobian, weight, off_rad)
+    weight = inverse(covariance) * seen.weight[0][..., None, None]
+    own = np.add.reduceat(np.einsum("nkap,nkab,nkbq->npq", jacobian, weight, jacobian), rays.first)
+    pull = np.add.reduceat(np.einsum("nkap,nkab,nkb->np", jacobian, weight, off_rad), rays.first)
     without = np.linalg.inv(information - own)
-    shift = np.einsum("npq,nq->np", without, pull)
+    shift = (without @ pull[..., None])[..., 0]
+    counts = np.diff(rays.first, append=len(weight))
+    without, shift = np.repeat(without, counts, axis=0), np.repeat(shift, counts, axis=0)
     off_rad = off_rad + np.einsum("nkap,np->nka", jacobian, shift)
     covariance = covariance + np.einsum("nkap,npq,nkbq->nkab", jacobian, without, jacobian)
-    gain = sum(densities(off_rad, covariance)) * rays.odds / rays.density
-    squared = np.einsum("nka,nkab,nkb->nk", off_rad, np.linalg.inv(covariance), off_rad)
+    gain = rays.of_dwells(sum(densities(off_rad, covariance)) * rays.odds / rays.density)
+    squared = np.einsum("nka,nkab,nkb->nk", off_rad, inverse(covariance), off_rad)
     probability = gain / (rays.missing + gain.sum(axis=1))[:, None]
-    return probability, np.sqrt(np.maximum(squared, 0.0))
+    return probability, np.sqrt(np.maximum(np.minimum.reduceat(squared, rays.first), 0.0))
 
 
 def _share(rays: CandidateRays, probability: Points2) -> float:
-    with_any = (rays.odds > 0.0).any(axis=1)
-    return float(min(probability.max(axis=1)[with_any].sum() / max(rays.likely[with_any].sum(), 1e-9), 1.0))
+    with_any = (rays.odds[rays.first] > 0.0).any(axis=1)
+    return float(probability.max(axis=1)[with_any].sum() / max(with_any.sum(), 1))
 
 
 _MOST_PAIRED = 600
@@ -342,7 +347,10 @@ def _from_two_dwells(
     seen_rad = np.arccos(np.clip(seen @ seen.T, -1.0, 1.0))
     range_m = rays.polar[dwell, 0]
     slack = _TOLERANCE * (np.hypot(*rays.sigma_polar[dwell, 1:].T) + prior.centre_sigma_m[1] / np.maximum(range_m, 1.0))
-    agree = (apart_rad > _LEAST_APART_RAD) & (np.abs(seen_rad - apart_rad) < slack[:, None] + slack)
+    of = rays.of_positions(np.arange(len(rays)))[dwell]
+    agree = (
+        (of[:, None] != of) & (apart_rad > _LEAST_APART_RAD) & (np.abs(seen_rad - apart_rad) < slack[:, None] + slack)
+    )
     one, other = np.nonzero(np.triu(agree, 1))
     rotations = _frames(seen[one], seen[other]) @ np.swapaxes(_frames(thought[one], thought[other]), 1, 2)
     near = np.flatnonzero(_turned_cosine(rotations, prior.rotation) > np.cos(MOST_TURNED_RAD))
@@ -386,7 +394,9 @@ def _rotation_scores(
         turned = (rotations @ _directions(rays, centre).T).transpose(2, 0, 1)
         forward, right, down = np.split(turned @ axes, 3, axis=-1)
         near = np.where(forward > 0.5, np.exp(-0.5 * (right**2 + down**2)), 0.0)
-        scores.append(np.log(rays.missing[:, None] + (near @ gain[..., None])[..., 0]).sum(axis=0))
+        scores.append(
+            np.log(rays.missing + rays.of_dwells((near @ gain[..., None])[..., 0].T[..., None])[..., 0]).sum(axis=1)
+        )
     return scores
 
 
@@ -457,9 +467,10 @@ def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:
     near, wide = densities(off_rad, covariance)
     odds = np.where(forward > _LEAST_FORWARD, rays.odds / rays.density, 0.0)
     gain = (near + wide) * odds
-    total = rays.missing + gain.sum(axis=-1)
-    weight = (near + wide / _WIDE**2) * odds / total[..., None]
-    return Expectation(off_rad, jacobian, covariance, gain / total[..., None], weight, np.log(total))
+    total = rays.missing + rays.of_dwells(gain).sum(axis=-1)
+    over = rays.of_positions(total)[..., None]
+    weight = (near + wide / _WIDE**2) * odds / over
+    return Expectation(off_rad, jacobian, covariance, gain / over, weight, np.log(total))
 
 
 def densities(off: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.candidate_rays import CandidateRays, by_position, candidate_rays, weaker_db
+from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
 from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
@@ -77,8 +77,7 @@ def proposals_of(
     if not views:
         return Proposals(())
     clicks = [click for click in confirmed if click.counts]
-    placed = by_position(views)
-    rays = candidate_rays(placed, camera, options, confirmed=clicks)
+    rays = candidate_rays(views, camera, options, confirmed=clicks)
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
     by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
@@ -87,23 +86,20 @@ def proposals_of(
     if chance is not None and agreement is not None:
         # deals are compared roughly: what full images do not repeat was chance
         chance = replace(chance, score=min(chance.score, agreement.score))
-    judged = _Judged.of(placed, rays, agreement, by_clicks, chance)
+    rays = rays.at_first()
+    judged = _Judged.of(views, rays, agreement, by_clicks, chance)
     covered, slips = _clicks_by_dwell(rays, judged, clicks, camera)
-    marks = [(placed[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
+    marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
-    last = 0
-    for view in views:
-        rows = range(last, last + len(view.placement.at_each))
-        last = rows.stop
-        if covered.keys() & set(rows):
+    for i, view in enumerate(views):
+        if i in covered:
             continue
-        best = max(rows, key=lambda i: float(judged.probability[i].max()))
-        proposal = judged.proposal(best)
+        proposal = judged.proposal(i)
         if proposal is None:
-            unproposed.append((view.placement, judged.reason(best)))
+            unproposed.append((view.placement, judged.reason(i)))
         elif (marked := _marked(proposal, view, marks)) is None:
-            ranked.append(replace(proposal, placement=view.placement))
+            ranked.append(proposal)
         else:
             range_m = np.linalg.norm(marked.position_radar_m)
             unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
@@ -159,7 +155,7 @@ class _Judged:
 
     Attributes:
         views: of all placements.
-        rays: their candidates.
+        rays: their candidates, each at its first position.
         agreement: the pose; None if there is none.
         probability: (n, k) of each candidate, the pose's own probability included.
         trusted: probability that the pose is right, and that reflectors stood there.

@@ -179,7 +179,7 @@ def test_a_click_that_slips_is_named_and_its_placement_is_not_offered(off_px, sl
 @pytest.mark.slow
 def test_confidence_is_borne_out():
     """Of proposals with confidence p a share of about p is right, and the surer third is right more often than the other end."""
-    drawn = [draw_views(seed, Drawing(count=10, decoys=6, first_share=0.4, listed_share=0.8)) for seed in range(6)]
+    drawn = [draw_views(seed, Drawing(count=10, decoys=9, first_share=0.5, listed_share=0.8)) for seed in range(6)]
     found = [(one.confidence, good) for own in drawn for one, good in _with_verdicts(own)]
     confidence, good = np.array(sorted(found)).T
     third = len(found) // 3
