@@ -103,6 +103,7 @@ def test_a_mark_can_be_dragged_nudged_and_removed(page: Driver, truth: Any) -> N
     assert page.view["clicks"] == []
 
 
+@pytest.mark.slow
 def test_dragging_away_from_a_mark_pans_and_places_nothing(page: Driver) -> None:
     page.zoom_to(400, 300, 3)
     before = page.place_of(400, 300)

@@ -84,6 +84,7 @@ def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any
     page.value("__cocalib.goTo(0)")
 
 
+@pytest.mark.slow
 def test_the_loupe_magnifies_4_to_16_times_and_stretches_the_contrast(page: Driver, truth: Any) -> None:
     user = page.page
     loupe = user.locator("#loupe")

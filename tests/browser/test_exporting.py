@@ -326,6 +326,7 @@ def test_rerun_gets_a_command_to_copy_and_a_file_that_it_opens(solved: Driver, t
     assert saved(solved, tmp_path).read_bytes()[:3] == b"RRF"
 
 
+@pytest.mark.slow
 def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
     solved.page.click("#tab-deliver")
     choose(solved, "tf2")

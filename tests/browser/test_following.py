@@ -95,6 +95,7 @@ def test_the_newest_frame_is_shown_until_the_user_steps_back(page, writer, follo
     assert page.page.evaluate(LATE)
 
 
+@pytest.mark.slow
 def test_the_newest_frame_is_shown_though_the_pace_was_told_first(open_page, server):
     open_page(server.url, script=PACE_FIRST).until("__cocalib.state.live")
 
@@ -126,6 +127,7 @@ def test_a_click_made_while_following_belongs_to_its_frame_and_stays(page, write
         again.close()
 
 
+@pytest.mark.slow
 def test_a_truncated_recording_is_refused_in_words_and_keeps_the_clicks(page, writer, workspace, tmp_path):
     page.until("__cocalib.state.live")
     page.value("__cocalib.goTo(0)")

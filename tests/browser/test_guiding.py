@@ -103,6 +103,7 @@ def test_zoomed_in_a_corner_shows_the_whole_image_and_leads_to_its_other_places(
     inset.wait_for(state="hidden")
 
 
+@pytest.mark.slow
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 2)

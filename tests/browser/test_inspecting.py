@@ -57,6 +57,7 @@ def test_assumptions_are_listed_until_the_user_confirms_them(
         assert len(workspace.session.confirmed) == 2
 
 
+@pytest.mark.slow
 def test_a_recording_without_problems_shows_no_warning(page: Driver) -> None:
     assert "receive time" not in page.text("#recording-topics")
     assert page.page.locator("#warnings *").count() == 0

@@ -41,6 +41,7 @@ def test_keys_and_the_table_go_from_placement_to_placement(page: Driver) -> None
     assert rows.nth(4).get_attribute("aria-selected") == "true"
 
 
+@pytest.mark.slow
 def test_the_view_from_above_explains_what_is_under_the_pointer(page: Driver) -> None:
     page.press("n")
     page.until("__cocalib.state.look.index === __cocalib.state.placements[0].frame")

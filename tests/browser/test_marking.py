@@ -55,6 +55,7 @@ def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any
     assert moved["state"] != "untouched"
 
 
+@pytest.mark.slow
 def test_a_frame_takes_several_marks_and_each_is_dragged_on_its_own(page: Driver, truth: Any) -> None:
     placement = truth["placements"][0]
     u, v = placement["pixel_px"]

@@ -41,6 +41,7 @@ def test_it_prints_to_four_pages_at_most_and_fits_a_telephone_without_a_word_fro
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
 
 
+@pytest.mark.slow
 def test_the_export_panel_downloads_the_report_of_the_answer_on_the_page(
     page: Driver, workspace: Workspace, project_root: Path, tmp_path: Path
 ) -> None:

@@ -118,6 +118,7 @@ def test_all_marks_are_on_one_sheet_the_worst_first_and_a_line_selects_those_to_
     page.until("__cocalib.state.selected === 'c7' && __cocalib.state.shown.index === __cocalib.state.cursor")
 
 
+@pytest.mark.slow
 def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_labelled(
     reviewing: Driver, truth: Any
 ) -> None:

@@ -138,6 +138,7 @@ def placements_in_strip(page: Driver) -> int:
     return int(np.count_nonzero(np.diff(is_blue.astype(int)) == 1))
 
 
+@pytest.mark.slow
 def test_times_of_a_long_recording_are_minutes_and_hours(page: Driver) -> None:
     texts = page.page.evaluate(
         """async () => {
