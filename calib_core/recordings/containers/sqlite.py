@@ -1,5 +1,6 @@
 """Read ROS 2 bags in SQLite (.db3), one message per row."""
 
+import re
 import shutil
 import sqlite3
 import threading
@@ -19,7 +20,6 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of, heads_from, keep_heads
-from calib_core.recordings.containers.message_files import definition_beside
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex, StoredChannel
 
@@ -28,6 +28,9 @@ _BATCH_ROWS = 20_000
 _MAX_FAULTS = 4000
 _SMALLEST_ROW_BYTES = 16
 _NO_END = 1 << 63
+_NAME = re.compile(r"\w+/msg/\w+")
+_USED = re.compile(r"^\s*(\w+(?:/\w+)?)", re.MULTILINE)
+_LONGEST_DEFINITION_BYTES = 1 << 18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -389,7 +392,7 @@ class SqliteSource:
         for number, topic, kind, encoding in self._rows("SELECT id, name, type, serialization_format FROM topics"):
             form, text = definitions.get(kind, ("", ""))
             if not text.strip():
-                text = definition_beside(self.path.parent, str(kind))
+                text = _definition_beside(self.path.parent, str(kind))
                 form = "msg" if text else ""
             channels.append(Channel(number, str(topic), str(kind), str(encoding), text, form))
         return tuple(channels)
@@ -544,3 +547,29 @@ class SqliteSource:
         with self._lock:
             self._until_closed.close()
         self._file.close()
+
+
+def _definition_beside(folder: Path, kind: str) -> str:
+    """Return the definition of a type and of those it uses, from files PACKAGE/msg/TYPE.msg beside a bag that has none."""
+    texts: dict[str, str] = {}
+    waiting = [kind]
+    for name in waiting:
+        text = "" if name in texts else _definition_text(folder, name, standard=name != kind)
+        if text:
+            texts[name] = text if name == kind else f"\n{'=' * 80}\nMSG: {name}\n{text}"
+            used = (one if "/" in one else f"{name.partition('/')[0]}/{one}" for one in _USED.findall(text))
+            waiting += sorted({one.replace("/", "/msg/") for one in used} - {*waiting})
+    return "".join(texts.values())
+
+
+def _definition_text(folder: Path, name: str, *, standard: bool) -> str:
+    """Return a type's own file, or what every ROS 2 installs; "" if there is neither."""
+    file = folder / f"{name}.msg"
+    if _NAME.fullmatch(name) and file.is_file() and file.stat().st_size <= _LONGEST_DEFINITION_BYTES:
+        return file.read_text("utf-8", errors="replace")
+    if not standard:
+        return ""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return store.generate_msgdef(name, ros_version=2)[0] if name in store.types else ""
