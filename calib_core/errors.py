@@ -9,7 +9,7 @@ CalibrationError
  └── UnsolvableError      a calibration was requested that the data cannot give
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from functools import singledispatch
 
@@ -58,6 +58,12 @@ class UnsolvableError(CalibrationError):
 
     def __str__(self) -> str:
         return in_words(self)
+
+
+def word_list(words: Sequence[str], conjunction: str = "and") -> str:
+    """Return words as they are listed in a sentence: a, b and c."""
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
 def meant(word: str, known: Iterable[str], these: str = "known:") -> str:

@@ -17,10 +17,6 @@ Axis: TypeAlias = Literal["roll", "pitch", "yaw"]
 """Of the camera about its own axes: roll about the viewing direction (z), pitch about x, yaw about y."""
 
 
-def _no_indices() -> Indices:
-    return np.zeros(0, dtype=np.int64)
-
-
 @dataclass(frozen=True, slots=True)
 class Spread:
     """Residual lengths in one bin of range, azimuth or image position.
@@ -93,7 +89,7 @@ class ResidualFigures:
     by_row: tuple[Spread, ...]
     held_out: HeldOut | None = None
     k_fold: HeldOut | None = None
-    placements: Indices = field(default_factory=_no_indices)
+    placements: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
     unpaired: tuple[Unpaired, ...] = ()
     association: str = ""
 

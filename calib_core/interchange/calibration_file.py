@@ -9,7 +9,7 @@ from msgspec import Meta
 from msgspec.structs import asdict, replace
 
 from calib_core.errors import InputError
-from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
+from calib_core.results import Calibration, CheckPoint, InputFile, UnconfirmedClicks
 from calib_core.words.verdict import StatedVerdict
 
 MOST_CHARACTERS = 120
@@ -301,7 +301,7 @@ def choose_check_point(calibration: Calibration) -> CheckPoint | None:
     """
     camera = calibration.camera
     centre_px = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
-    inliers = sorted((pair for pair in calibration.pairs if pair.inlier), key=_id)
+    inliers = sorted((pair for pair in calibration.pairs if pair.inlier), key=lambda pair: pair.id)
     reported_radar_m = np.array([pair.point_radar_m for pair in inliers]).reshape(-1, 3)
     points_radar_m = np.round(calibration.radar_errors.corrected(reported_radar_m), 3)
     if not _indices_seen(calibration, points_radar_m).size:
@@ -314,10 +314,6 @@ def choose_check_point(calibration: Calibration) -> CheckPoint | None:
     pixels_px = calibration.camera.project(calibration.camera_from_radar @ points_radar_m)
     nearest = int(np.argmin(np.linalg.norm(pixels_px - centre_px, axis=1)))
     return CheckPoint(points_radar_m[nearest], pixels_px[nearest])
-
-
-def _id(pair: PairResult) -> str:
-    return pair.id
 
 
 def _indices_seen(calibration: Calibration, points_radar_m: np.ndarray) -> np.ndarray:

@@ -309,14 +309,14 @@ def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
         array = np.asarray(value)
         if array.dtype.kind in "US":
             lines = [line for text in array.ravel().tolist() for line in str(text).splitlines()]
-            yield from [f"{owner}{key} = {lines[0]!r}"] if len(lines) == 1 else [f"{owner}{key}", *_indented(lines)]
+            yield from (
+                [f"{owner}{key} = {lines[0]!r}"]
+                if len(lines) == 1
+                else [f"{owner}{key}", *(f"    {line}" for line in lines)]
+            )
             continue
         yield f"{owner}{key}  {array.dtype}  {' x '.join(map(str, array.shape)) or 'scalar'}"
         yield from (f"    {row}" for row in _rows(array))
-
-
-def _indented(lines: list[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
 
 
 def _rows(array: np.ndarray) -> list[str]:

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from calib_core.arrays import Counts, Vector3, freeze
+from calib_core.errors import word_list
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_images import BoardCorners, LeftOutImage
 
@@ -152,7 +153,7 @@ def _missing(
         sentences.append(f"{count} views of the board, 15 to 30 are better: film it from more directions")
     empty = [_PLACES[row][column] for row in range(3) for column in range(3) if not _third(covered, row, column).any()]
     if empty:
-        sentences.append(f"nothing in the {_list_text(empty)} of the image: hold the board there, tilted")
+        sentences.append(f"nothing in the {word_list(empty)} of the image: hold the board there, tilted")
     elif share < _SHARE_WANTED:
         sentences.append(
             f"the board was in {100.0 * share:.0f} % of the image: hold it nearer to the borders and corners"
@@ -171,10 +172,6 @@ def _missing(
 def _third(covered: np.ndarray, row: int, column: int) -> np.ndarray:
     height, width = covered.shape[0] // 3, covered.shape[1] // 3
     return covered[row * height : (row + 1) * height, column * width : (column + 1) * width]
-
-
-def _list_text(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 @dataclass(frozen=True, slots=True)

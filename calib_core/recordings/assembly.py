@@ -153,7 +153,7 @@ def assemble(
         [
             *about_camera,
             *radar_warnings(radar),
-            *_claim_warnings(radar),
+            *(warning for part in (radar.parts if radar else ()) for warning in claim_warnings(part)),
             *image_warnings(images),
             *video_warnings(images),
         ]
@@ -379,10 +379,6 @@ def _topic_stream(topic: Topic, inventory: Inventory, times_ns: TimesNs, heads: 
     assert first is not None, "a topic to choose from has a layout"
     layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
     return RadarStream(topic, layouts, times_ns, heads, is_timed=times_from(topic) != COUNTED)
-
-
-def _claim_warnings(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
-    return [warning for part in (radar.parts if radar else ()) for warning in claim_warnings(part)]
 
 
 def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs]) -> ImageStream | None:

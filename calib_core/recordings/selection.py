@@ -236,10 +236,6 @@ class RecordingOptions:
     no_recording_file: bool = option(False, "Ignore a recording.toml beside the recording.")
 
 
-def _no_counts() -> dict[str, int]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Inventory:
     """All topics with what each can be used for, and the recording's name for messages.
@@ -251,7 +247,7 @@ class Inventory:
     name: str
     topics: tuple[Topic, ...]
     usages: Mapping[str, Usage]
-    counts: Mapping[str, int] = field(default_factory=_no_counts)
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     def count(self, topic: Topic) -> int:
         """Return how many messages a topic has."""

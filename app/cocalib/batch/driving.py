@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
 from calib_core.errors import InputError, OptionError
 from cocalib.batch.dask_scheduler import DaskScheduler, checked_address
@@ -75,8 +74,9 @@ def drive(
     folder = results.path.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     calls = [(job, folder) for job in left]
+    died = lambda number: failed_outcome(left[number], folder, reason=_DIED, hint=_DIED_HINT)  # noqa: E731
     try:
-        with closing(engine.run_all(run_once, calls, lambda number: _worker_died(left[number], folder))) as outcomes:
+        with closing(engine.run_all(run_once, calls, died)) as outcomes:
             for finished, (_, outcome) in enumerate(outcomes, start=1):
                 found[outcome.digest] = outcome
                 done += times[outcome.digest]
@@ -85,10 +85,6 @@ def drive(
     finally:
         results.remove_leftovers()
     return tuple(found[job.digest] for job in jobs)
-
-
-def _worker_died(job: Job, results: Path) -> Outcome:
-    return failed_outcome(job, results, reason=_DIED, hint=_DIED_HINT)
 
 
 def chosen_engine(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
-from calib_core.errors import InputError
+from calib_core.errors import InputError, word_list
 from cocalib.cli.commands import PROGRAM, Command, Runnable
 from cocalib.cli.tyro_hook import Argument, Fault, flags_of, parse
 from cocalib.platform.terminal import with_colours
@@ -48,7 +48,7 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
         return f"{argument.name} needs a value: {named}"
     if fault.choices:
         near = get_close_matches((typed or "").lower(), fault.choices, n=1)
-        wanted = f"{argument.name} takes {_alternatives(fault.choices)}, not '{typed}'"
+        wanted = f"{argument.name} takes {word_list(fault.choices, 'or')}, not '{typed}'"
         return f"{argument.name} {typed}: did you mean {near[0]}?" if near else wanted
     what = _NUMBERS.get(argument.value, argument.value)
     only = "" if argument.value in _NUMBERS else ", as numbers like 0.5, without units"
@@ -60,10 +60,6 @@ def _argument_text(argument: Argument) -> str:
     return f"{argument.name} {argument.value}".rstrip()
 
 
-def _alternatives(words: Sequence[str]) -> str:
-    return " or ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-
-
 def _unknown(token: str, kind: type[Runnable]) -> str:
     """Return a message about an unknown argument, with suggestions."""
     if not token.startswith("-"):
@@ -73,4 +69,4 @@ def _unknown(token: str, kind: type[Runnable]) -> str:
     near = [other for other in known if other == _MEANT.get(flag.lstrip("-"))]
     near = near or [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
     near = near or get_close_matches(flag, known, n=2)
-    return f"unknown option {token.split('=')[0]}" + (f"; did you mean {_alternatives(near[:3])}?" if near else "")
+    return f"unknown option {token.split('=')[0]}" + (f"; did you mean {word_list(near[:3], 'or')}?" if near else "")

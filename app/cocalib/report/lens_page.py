@@ -34,7 +34,11 @@ def lens_report_html(lens: CalibratedLens, source: ImageSource, coverage: Covera
     """
     body = tag(
         "body",
-        tag("header", tag("h1", "Camera lens report"), tag("p", tag("b", source.name), f", {_board_text(lens)}")),
+        tag(
+            "header",
+            tag("h1", "Camera lens report"),
+            tag("p", tag("b", source.name), f", {lens.board.text}, {1e3 * lens.board.square_m:g} mm"),
+        ),
         tag(
             "main",
             _answer(lens, searched),
@@ -64,10 +68,6 @@ def _answer(lens: CalibratedLens, searched: int) -> Markup:
         tag("div", _parameter_table(lens), _model_table(lens), class_="two"),
         id="lens",
     )
-
-
-def _board_text(lens: CalibratedLens) -> str:
-    return f"{lens.board.text}, {1e3 * lens.board.square_m:g} mm"
 
 
 def _foot() -> str:

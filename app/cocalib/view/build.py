@@ -157,8 +157,9 @@ def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
     metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
     metrics = (*metrics, *_placements(calibration))
     figures = (*pose, *metrics) if assumed else (*metrics, *pose)
-    figures = tuple(replace(figure, label=_full_label(figure)) for figure in figures)
-    width = max(len(figure.label) for figure in figures)
+    labels = [f"{one.label} ({one.abbreviation})" if one.abbreviation else one.label for one in figures]
+    figures = tuple(replace(figure, label=label) for figure, label in zip(figures, labels, strict=True))
+    width = max(map(len, labels))
     verdict = verdict_on(calibration)
     lines = ["verdict: " + verdict_line(verdict)]
     lines += ["assumes: " + assumed_words(verdict.assumed)] if verdict.assumed else []
@@ -199,10 +200,6 @@ def _placements(calibration: Calibration) -> tuple[Figure, ...]:
         return ()
     count = len(linked_clicks(pairs, calibration.options))
     return (Figure("placements", "placements (pairs)", f"{count}", "", ""),)
-
-
-def _full_label(figure: Figure) -> str:
-    return f"{figure.label} ({figure.abbreviation})" if figure.abbreviation else figure.label
 
 
 def _line(figure: Figure, width: int) -> str:

@@ -1,13 +1,13 @@
 """Do two calibrations agree: how far apart they are, judged by limits or by the covariances they state; if not, by which slip."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
-from calib_core.errors import InputError
+from calib_core.errors import InputError, word_list
 from calib_core.estimation.pose_change import PoseChange, level_of, pose_change
 from calib_core.geometry import RigidTransform, pose_difference, rotation_angle_rad, squared_distance
 from calib_core.interchange.calibration_file import CalibrationFile
@@ -110,7 +110,7 @@ class Comparison:
         """What was compared, if that is not all of both."""
         one = "only one of the two uncertainties is known; the standard deviations come from that one alone"
         shared = (
-            f"the errors of {_name_list(self.shared)} are the same in both, and are taken out" if self.shared else ""
+            f"the errors of {word_list(self.shared)} are the same in both, and are taken out" if self.shared else ""
         )
         unshared = f"every error counts as independent, because {self.unshared}" if self.unshared else ""
         return tuple(filter(None, (self.lens_note, shared, unshared, one if self.covariances == 1 else "")))
@@ -203,10 +203,6 @@ def _change(
     if not isinstance(joint, PoseChange):
         return apart, (), joint
     return joint, ("radar", *(["lens"] if lens else []), *(["clicks"] if same_person else [])), ""
-
-
-def _name_list(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
 
 
 def _other_sensors(a: CalibrationFile, b: CalibrationFile) -> str:
@@ -337,9 +333,7 @@ def judge(comparison: Comparison, limits: AgreementLimits) -> Judgement:
         level = LEVEL if limits.max_sigma is None else level_of(limits.max_sigma)
     elif change is not None:
         criteria, basis = [_by_change(change)], "95 % test under the stated covariances"
-        basis = (
-            f"95 % test with the errors of {_name_list(comparison.shared)} taken out" if comparison.shared else basis
-        )
+        basis = f"95 % test with the errors of {word_list(comparison.shared)} taken out" if comparison.shared else basis
     else:
         criteria = _by_limits(comparison, AgreementLimits(WITHOUT_COVARIANCE["deg"], WITHOUT_COVARIANCE["cm"]))
         criteria += _pixels_at(comparison, _JUDGED_AT_M, WITHOUT_COVARIANCE["px"])

@@ -42,7 +42,7 @@ def document_in(content: Mapping[str, Any], document: type[Document], *, source:
     Raises:
         InputError: another format, an unknown key, a value of the wrong type, NaN or Infinity.
     """
-    wanted = _schema_of(document)
+    wanted = str(get_args(get_type_hints(document)["schema"])[0])
     found = content.get("schema")
     if found != wanted:
         same = str(found).rpartition("-")[0] == wanted.rpartition("-")[0]
@@ -89,10 +89,6 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
             f"{source}: expected an object in braces, found {_value_text(content)}; give a file in one of cocalib's formats"
         )
     return content
-
-
-def _schema_of(document: type) -> str:
-    return str(get_args(get_type_hints(document)["schema"])[0])
 
 
 def _value_text(value: Any) -> str:

@@ -1,7 +1,6 @@
 """Read the recorded intrinsics (sensor_msgs/CameraInfo) and check them against the images."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -9,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from calib_core.camera import Camera, CameraModel
-from calib_core.errors import RecordingError
+from calib_core.errors import RecordingError, word_list
 from calib_core.lens_models.registry import LENS_MODELS, lenses_of_opencv, names_in, opencv_lens
 from calib_core.measurements import DataWarning
 from calib_core.recordings.camera.image_stream import ImageStream
@@ -82,12 +81,12 @@ def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray]
         name = ""
     lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
     if lens is None:
-        return f"has unknown lens model '{name}'; {_topic_list(names_in('camera_info'), 'and')} are supported"
+        return f"has unknown lens model '{name}'; {word_list(names_in('camera_info'))} are supported"
     if lens.opencv == "projectPoints":
         return _model_by_count(name, distortion)
     kept = next((count for count in reversed(lens.counts) if count <= len(distortion)), None)
     if kept is None or np.any(distortion[kept:]):
-        expected = _topic_list([str(count) for count in lens.counts], "or")
+        expected = word_list([str(count) for count in lens.counts], "or")
         return f"has lens model '{name}' with {len(distortion)} coefficients; {expected} are expected"
     return lens.name, distortion[:kept]
 
@@ -102,14 +101,9 @@ def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np
         distortion = distortion[:longest]
     lens = next((lens for lens in lenses if len(distortion) in lens.counts), None)
     if lens is None:
-        known = _topic_list([str(count) for lens in lenses for count in lens.counts if count], "or")
+        known = word_list([str(count) for lens in lenses for count in lens.counts if count], "or")
         return f"has lens model '{name or 'none'}' with {len(distortion)} coefficients; {known} are supported"
     return lens.name, distortion
-
-
-def _topic_list(words: Sequence[str], conjunction: str) -> str:
-    *first, last = words
-    return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
 def _window(message: Message) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:

@@ -202,11 +202,7 @@ def merged_messages(
         losses: takes the unreadable ones.
     """
     streams = [file.messages(wanted, losses) for file, wanted in zip(files, rows, strict=True)]
-    return heapq.merge(*streams, key=_log_time)
-
-
-def _log_time(message: StoredMessage) -> int:
-    return message.log_time
+    return heapq.merge(*streams, key=lambda message: message.log_time)
 
 
 def besides_messages(source: McapSource) -> BesidesMessages:

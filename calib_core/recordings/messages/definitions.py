@@ -105,10 +105,6 @@ class Field:
     comment: str = field(default="", compare=False)
 
 
-def _no_remarks() -> dict[str, str]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True)
 class Definition:
     """A message type and all types it contains.
@@ -123,7 +119,7 @@ class Definition:
     type: str
     types: Mapping[str, tuple[Field, ...]]
     encoding: Encoding
-    remarks: Mapping[str, str] = field(default_factory=_no_remarks)
+    remarks: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -199,7 +195,10 @@ def parse_definition(name: str, text: str, encoding: Encoding, *, form: str = "m
     if len(text) > _MAX_TEXT:
         raise MessageError(f"the definition of {name} is {len(text)} characters long; at most {_MAX_TEXT} are allowed")
     types: dict[str, tuple[Field, ...]] = dict(_built_in(encoding))
-    types.update(_parse_idl(name, text) if form == "idl" else _parse_sections(name, text))
+    if form == "idl":
+        types.update(_parse_idl(name, text))
+    else:
+        types.update((owner, tuple(_parse_fields(owner, body))) for owner, body in _sections(name, text))
     types = {owner: _resolve(owner, fields, types) for owner, fields in types.items()}
     definition = Definition(name, types, encoding, {} if form == "idl" else _remarks(name, text))
     _check(definition, name, ())
@@ -219,10 +218,6 @@ def _built_in(encoding: Encoding) -> dict[str, tuple[Field, ...]]:
         "builtin_interfaces/Duration": stamp,
         "std_msgs/Header": (Field("stamp", "builtin_interfaces/Time"), Field("frame_id", "string")),
     }
-
-
-def _parse_sections(name: str, text: str) -> dict[str, tuple[Field, ...]]:
-    return {owner: tuple(_parse_fields(owner, body)) for owner, body in _sections(name, text)}
 
 
 def _sections(name: str, text: str) -> list[tuple[str, str]]:

@@ -18,10 +18,6 @@ _HEADER_BYTES = 16
 _CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
 
 
-def _no_faults() -> dict[Path, str]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainSource:
     """One folder or file with one topic; implements Source.
@@ -61,7 +57,7 @@ class PlainSource:
     names: tuple[str, ...] = ()
     times_from: str = ""
     camera: FolderCamera | None = None
-    unreadable: Mapping[Path, str] = field(default_factory=_no_faults)
+    unreadable: Mapping[Path, str] = field(default_factory=dict)
     computed: str = ""
 
     def __post_init__(self) -> None:

@@ -211,7 +211,9 @@ class Story:
         person = _person(leg, self._legs[number - 1] if number else leg, time_s)
         resting = self.restings[min(max(leg.placement, 0), len(self.restings) - 1)]
         height_m = float(resting.position_m[2])
-        held = hand_position(_upright(person)) + np.array([0.0, 0.0, 0.03])
+        held = hand_position(PersonState(person.x_m, person.y_m, person.heading_rad, carrying=True)) + np.array(
+            [0.0, 0.0, 0.03]
+        )
         if leg.carrying:
             return Moment(person, held, person.heading_rad, None, height_m)
         if leg.action in ("put", "pick"):
@@ -226,10 +228,6 @@ class Story:
 def _turn(angle_rad: float) -> float:
     """Wrap an angle to -pi to pi."""
     return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
-
-
-def _upright(person: PersonState) -> PersonState:
-    return PersonState(person.x_m, person.y_m, person.heading_rad, carrying=True)
 
 
 def _eased(share: float) -> float:

@@ -113,17 +113,18 @@ def _transform(name: str, equation: str, source: str, target: str, transform: Ri
             tag("tbody", *rows),
             class_="matrix",
         ),
-        tag("p", "quaternion wxyz ", *_spaced(_data(value, 6) for value in quaternion), class_="quaternion"),
+        tag(
+            "p",
+            "quaternion wxyz ",
+            *(part for value in quaternion for part in (_data(value, 6), " ")),
+            class_="quaternion",
+        ),
         id=name,
     )
 
 
 def _data(value: float, decimals: int) -> Markup:
     return tag("data", f"{value + 0.0:.{decimals}f}", value=repr(float(value)))
-
-
-def _spaced(parts: object) -> list[Child]:
-    return [child for part in parts for child in (part, " ")]  # type: ignore[attr-defined]
 
 
 def _no_camera() -> Markup:

@@ -201,7 +201,7 @@ class _Downloads:
             "/api/report.html": self._report,
             "/api/rerun.json": self._rerun,
             "/api/view.rrd": lambda _query: self._of_calibration(self._view_file.answer),
-            "/api/formats.json": _formats,
+            "/api/formats.json": lambda _query: _reply(msgspec.json.encode(format_rows()), _TYPES[".json"]),
             "/api/activity.json": self._activity,
             "/api/camera.yaml": self._camera,
             "/api/board_corners.json": self._board_corners,
@@ -420,10 +420,6 @@ def _page(path: Path, _query: str) -> Reply:
 def _download(data: bytes, name: str) -> Reply:
     kind = _TYPES.get(Path(name).suffix, "application/octet-stream")
     return _reply(data, kind, more=(("Content-Disposition", f'attachment; filename="{name}"'),))
-
-
-def _formats(_query: str) -> Reply:
-    return _reply(msgspec.json.encode(format_rows()), _TYPES[".json"])
 
 
 @lru_cache(maxsize=2)
