@@ -116,12 +116,12 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   const here = state.seconds[state.cursor];
   const left = axis.toX(Math.max(placement.start_s, state.seconds[0]));
   const wide = Math.max(5, axis.toX(Math.min(placement.end_s, state.seconds[state.seconds.length - 1])) - left);
-  const [middle, height] = [left + wide / 2, bottom - top];
+  const [from, to] = [Math.max(left, axis.toX(axis.from_s)), Math.min(left + wide, axis.toX(axis.to_s))]; // what is in sight of it
   const fate = stateOf(placement);
   const current = placement.start_s <= here && here <= placement.end_s;
   pen.lineWidth = 1;
   pen.beginPath();
-  pen.roundRect(left, top, wide, height, 3);
+  pen.roundRect(left, top, wide, bottom - top, 3);
   pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" || fate === "unlikely" ? "faint" : "accent");
   if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2);
   pen.fillStyle = themeColour(fate === "marked" ? "accent" : "accent-soft");
@@ -135,11 +135,11 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
     pen.fillStyle = themeColour("accent");
     pen.fillRect(left + 1, bottom - 2.5, Math.max(2, (wide - 2) * sure), 2.5);
   }
-  if (wide < 15 || height < 9) return;
+  if (to - from < 15 || bottom - top < 9) return;
   pen.font = smallFont(1, "600");
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = themeColour("ink");
-  pen.fillText(`${state.placements.indexOf(placement) + 1}`, middle, (top + bottom) / 2 + 0.5);
+  pen.fillText(`${state.placements.indexOf(placement) + 1}`, (from + to) / 2, (top + bottom) / 2 + 0.5);
 }
 
 /** @param {Context2D} pen @param {number} left @param {number} right @param {number} y */
