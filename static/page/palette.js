@@ -25,7 +25,7 @@ export function startPalette() {
   register({ id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: () => togglePalette() });
   register({ id: "still-objects", group: "Time", words: "List what stood still and is hardly the reflector", also: "placements left out", run: () => togglePalette(STILL), when: () => (state.placements.some((one) => stateOf(one) === "unlikely") ? "" : "There is none") });
   field.type = "text";
-  field.placeholder = "Action or option, placement 7, pair 3, frame 120, time 12.5";
+  field.placeholder = "Action, option, placement 7, frame 120, time 12.5";
   field.spellcheck = false;
   field.autocomplete = "off";
   const attributes = { role: "combobox", "aria-label": "Search for an action, a placement, a pair or an option", "aria-expanded": "true", "aria-controls": "palette-found", "aria-autocomplete": "list" };

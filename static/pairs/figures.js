@@ -130,7 +130,7 @@ function drawVerdict() {
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
   const { level, word, early } = view.verdict;
-  const [line, assumes] = [said(view.verdict.line), said(view.verdict.assumes)];
+  const [line, assumes] = [said(view.verdict.line).replace(/(\d) (?=[a-z%])/g, "$1\u00a0"), said(view.verdict.assumes)]; // a number stays with its unit
   const aed = view.metrics.find((figure) => figure.key === "aed");
   const text = JSON.stringify([level, word, line, early, assumes, aed]);
   if (text === drawn) return;

@@ -172,8 +172,8 @@ class Driver:
         self.settle()
 
     def text(self, selector: str) -> str:
-        """Return the text of an element."""
-        return self.page.inner_text(selector)
+        """Return the text of an element, with a plain space between a number and its unit."""
+        return self.page.inner_text(selector).replace("\u00a0", " ")
 
     def said(self, words: dict[str, Any]) -> str:
         """Return words of the server as the page says them."""
