@@ -152,8 +152,7 @@ def _labels(sight: Sight) -> Iterator[SpaceLabel]:
     if isinstance(solved, Calibration):
         for pair in solved.pairs:
             if pair.id == sight.selected:
-                reported_m = float(np.linalg.norm(pair.point_radar_m))
-                words = f"{pair.id}: {reported_m:.1f} m, {_residual(pair)}"
+                words = f"{pair.id}: {np.linalg.norm(pair.point_radar_m):.1f} m, {_residual(pair)}"
                 yield SpaceLabel(words, _rounded(true_positions(solved, (pair,))[0]), "selected")
     if advice is not None and not (advice.best.may_stop or sight.view.verdict.done):
         yield SpaceLabel(f"next {advice.range_m:.1f} m", _rounded(advice.best.position_radar_m), "next")
