@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Matrix22, Values, Vector2, Vector3, freeze
+from calib_core.arrays import Indices, Matrix22, Values, Vector2, Vector3, freeze
 
 _PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
 """How much the image is reduced, and the radius of the disc there [px]."""
@@ -230,13 +230,13 @@ def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float)
     reach = reach_px / level.factor + 1.5
     first, last = np.floor(near - reach).astype(int), np.ceil(near + reach).astype(int) + 1
     part = level.grey[first[1] - half : last[1] + half, first[0] - half : last[0] + half]
-    scores = score_sectors(part, radius_px)
-    highest = cv2.dilate(scores.score, np.ones((3, 3), np.uint8))
-    for row, column in np.argwhere((scores.score >= highest) & (scores.score > _LEAST_SCORE)):
+    scores, starts_rad = score_sectors(part, radius_px)
+    highest = cv2.dilate(scores, np.ones((3, 3), np.uint8))
+    for row, column in np.argwhere((scores >= highest) & (scores > _LEAST_SCORE)):
         pixel_px = level.to_full(np.array([column + first[0], row + first[1]], dtype=np.float64))
         if float(np.hypot(*(pixel_px - near_px))) <= reach_px + level.factor:
-            starts_rad = scores.starts_rad[row, column]
-            yield _Proposal(float(scores.score[row, column]), pixel_px, starts_rad, level.factor, radius_px)
+            score = float(scores[row, column])
+            yield _Proposal(score, pixel_px, starts_rad[row, column], level.factor, radius_px)
 
 
 def _grown(levels: dict[int, _Reduced], proposal: _Proposal) -> _Found | None:
@@ -589,31 +589,11 @@ _QUIET_GREY = 2.0
 """Where grey levels vary less than this, there is nothing to find."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SectorScores:
-    """The best division into three sectors at each pixel.
-
-    Attributes:
-        score: (h, w) what the weakest of the three boundaries explains, relative to what remains unexplained.
-        starts_rad: (h, w, 3) where the sectors begin, from x towards y.
-    """
-
-    score: np.ndarray
-    starts_rad: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Divisions:
-    """All ways to divide the wedges into three sectors: (k, 3) first wedges, and the start in radians."""
-
-    first: np.ndarray
-    starts_rad: np.ndarray
-
-
 @lru_cache(maxsize=1)
-def _divisions() -> _Divisions:
+def _divisions() -> Indices:
+    """Return all ways to divide the wedges into three sectors: the first wedge of each (k, 3)."""
     widths = range(_NARROWEST, _WIDEST + 1)
-    first = np.array(
+    return np.array(
         [
             (start, start + width, start + width + two)
             for start in range(_WEDGES)
@@ -622,7 +602,6 @@ def _divisions() -> _Divisions:
             if _WEDGES - width - two in widths and start + width + two < _WEDGES
         ]
     )
-    return _Divisions(first, first * (2.0 * np.pi / _WEDGES))
 
 
 @lru_cache(maxsize=8)
@@ -639,8 +618,10 @@ def _wedge_kernels(radius_px: float) -> np.ndarray:
     return np.array([share.reshape(side, _FINE, side, _FINE).mean(axis=(1, 3)) for share in shares], dtype=np.float32)
 
 
-def score_sectors(grey: np.ndarray, radius_px: float) -> SectorScores:
-    """Score each pixel whose disc lies inside the image.
+def score_sectors(grey: np.ndarray, radius_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the score of each pixel (h, w) whose disc lies inside the image, and where its sectors begin (h, w, 3) [rad].
+
+    A score is what the weakest of the three boundaries explains, relative to what remains unexplained.
 
     Args:
         grey: (h + 2 n, w + 2 n) float32, with n the radius rounded up.
@@ -663,11 +644,11 @@ def score_sectors(grey: np.ndarray, radius_px: float) -> SectorScores:
     score = np.zeros(squares.shape, dtype=np.float32)
     starts_rad = np.zeros((*squares.shape, 3))
     if len(busy[0]):
-        scores = _weakest_boundary(sums[:, busy[0], busy[1]], squares[busy], areas, divisions.first)
+        scores = _weakest_boundary(sums[:, busy[0], busy[1]], squares[busy], areas, divisions)
         best = scores.argmax(axis=0)
         score[busy] = scores[best, np.arange(len(best))]
-        starts_rad[busy] = divisions.starts_rad[best]
-    return SectorScores(score, starts_rad)
+        starts_rad[busy] = divisions[best] * (2.0 * np.pi / _WEDGES)
+    return score, starts_rad
 
 
 def _weakest_boundary(sums: np.ndarray, squares: np.ndarray, areas: np.ndarray, first: np.ndarray) -> np.ndarray:
