@@ -24,7 +24,7 @@ from cocalib.session.events import IntrinsicsChosen
 from cocalib.session.state import ChosenIntrinsics
 from cocalib.view.model import Figure, warning_row
 from cocalib.view.wording import plain, sentence, with_sigma
-from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.outbox import Notice, Outbox
 from cocalib.web.messages.lens_messages import (
     LensCalibrate,
     LensCamera,
@@ -38,8 +38,6 @@ from cocalib.web.messages.lens_messages import (
 from cocalib.web.messages.outgoing import Outgoing, encode
 from cocalib.workspace import Workspace
 
-_TELL_EVERY_S = 0.2
-"""Pages are told of the progress no more often [s]."""
 _log = logging.getLogger(__name__)
 _MOST_RESIDUALS = 3000
 _GRID = (24, 16)
@@ -59,9 +57,8 @@ class LensService:
         self._workspace = workspace
         self._images = RecordedImages(recording)
         self._tell = tell
-        self._job = LensJob(self._note_progress)
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._is_due = False
+        self._notice = Notice(lambda: asyncio.create_task(self._show_all()))
+        self._job = LensJob(self._notice.give)
         self._result: LensResult | None = None
         self._result_of: CalibratedLens | None = None
         self._number = 0
@@ -69,7 +66,7 @@ class LensService:
 
     def start(self) -> None:
         """Begin to tell the pages, on the running loop."""
-        self._loop = asyncio.get_running_loop()
+        self._notice.start()
 
     def greet(self, outbox: Outbox) -> None:
         """Send the present state to a page that has just opened."""
@@ -108,7 +105,7 @@ class LensService:
 
     async def close(self) -> None:
         """Stop the calibration, and tell the pages nothing more."""
-        self._loop = None
+        self._notice.stop()
         await asyncio.to_thread(self._job.close)
 
     def corners(self, frame: int) -> tuple[tuple[float, float, float, float, bool], ...]:
@@ -128,22 +125,6 @@ class LensService:
             raise InputError("there are no intrinsics to save yet; calibrate the lens first")
         return camera_info_text(camera, "camera") + HASH_TAG
 
-    def _note_progress(self) -> None:
-        """Take note of progress, in the thread of the calibration; the pages are told shortly afterwards."""
-        loop = self._loop
-        if loop is None or self._is_due:
-            return
-        self._is_due = True
-        try:
-            loop.call_soon_threadsafe(loop.call_later, _TELL_EVERY_S, self._show)
-        except RuntimeError:
-            _log.debug("progress came after the server had stopped")
-
-    def _show(self) -> None:
-        self._is_due = False
-        if self._loop is not None:
-            self._loop.create_task(self._show_all())
-
     async def _show_all(self) -> None:
         """Tell the pages the state, after the result that it speaks of."""
         with error_boundary("showing the calibrated lens", _log.error):
@@ -154,7 +135,7 @@ class LensService:
                 work = partial(lens_result, self._number, lens, _lens_source(lens))
                 self._result = await asyncio.to_thread(work)
                 self._tell(self._result, "lens_result")
-            if self._loop is not None:
+            if self._notice.is_on:
                 self._tell(self._present(), "lens")
 
     def _present(self) -> LensState:
@@ -176,12 +157,8 @@ class LensService:
             can_resume=now.can_resume,
             coverage=_coverage(now),
             result=self._result.number if self._result else 0,
-            in_use=_is_in_use(now, chosen),
+            in_use=now.lens is not None and chosen == ChosenIntrinsics.of(now.lens.camera, _lens_source(now.lens)),
         )
-
-
-def _is_in_use(now: LensSnapshot, chosen: ChosenIntrinsics | None) -> bool:
-    return now.lens is not None and chosen == ChosenIntrinsics.of(now.lens.camera, _lens_source(now.lens))
 
 
 def _lens_source(lens: CalibratedLens) -> str:

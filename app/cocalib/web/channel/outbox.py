@@ -1,4 +1,4 @@
-"""What waits for one page, of which only the newest matters: messages by their kind, work, and the View as text."""
+"""What waits for one page, of which only the newest matters, and what tells all pages of changes."""
 
 import asyncio
 import logging
@@ -16,6 +16,8 @@ Message: TypeAlias = str | bytes | Callable[[], str]
 
 _MOST = 2000
 """A page that leaves more messages than this unread is considered gone."""
+_NOTICE_EVERY_S = 0.2
+"""Pages are told of changes no more often [s]."""
 Item = TypeVar("Item")
 _log = logging.getLogger(__name__)
 
@@ -147,3 +149,42 @@ class ViewFeed:
         number = shown.changes + 1
         change = ViewChange(number, self._change.fields, self._change.clicks)
         return encode(change), Shown(self._newest, number)
+
+
+class Notice:
+    """Tells all pages of changes that any thread makes, soon after them: on the event loop, from start to stop."""
+
+    def __init__(self, tell: Callable[[], object]) -> None:
+        """Set up the notice; tell is called on the event loop."""
+        self._tell = tell
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_due = False
+
+    def start(self) -> None:
+        """Begin to tell the pages, on the running loop."""
+        self._loop = asyncio.get_running_loop()
+
+    def stop(self) -> None:
+        """Tell the pages nothing more."""
+        self._loop = None
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the pages are still told."""
+        return self._loop is not None
+
+    def give(self) -> None:
+        """Take note of a change, in any thread; the pages are told shortly afterwards."""
+        loop = self._loop
+        if loop is None or self._is_due:
+            return
+        self._is_due = True
+        try:
+            loop.call_soon_threadsafe(loop.call_later, _NOTICE_EVERY_S, self._show)
+        except RuntimeError:
+            _log.debug("a change came after the server had stopped")
+
+    def _show(self) -> None:
+        self._is_due = False
+        if self.is_on:
+            self._tell()

@@ -1,7 +1,6 @@
 """Proposals for the pages of a recording: made in the background, and anew with each click."""
 
 import asyncio
-import logging
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,7 +14,7 @@ from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
 from cocalib.view.placement_states import SeenPlacements, Spots, is_dismissed, unmarked
 from cocalib.view.wording import sentence
-from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.outbox import Notice, Outbox
 from cocalib.web.messages.incoming import ProposingSwitch, SnapWanted
 from cocalib.web.messages.outgoing import (
     Outgoing,
@@ -28,8 +27,6 @@ from cocalib.web.messages.outgoing import (
 )
 from cocalib.workspace import Workspace
 
-_TELL_EVERY_S = 0.2
-"""Pages are told of changes no more often [s]."""
 _SHORTEST_S = 2.0
 """A target that stands still for less is not looked for in the images."""
 _GROWING = (
@@ -41,7 +38,6 @@ _NO_RADAR = (
     "there are no radar scans, so nothing says when the reflector stood still",
     "open the radar's recording, too",
 )
-_log = logging.getLogger(__name__)
 
 
 class ProposingService:
@@ -62,9 +58,8 @@ class ProposingService:
         self._recording = recording
         self._tell = tell
         self._on = on
-        self._job = ProposingJob(recording, self._changed, workspace.wait_for_answer)
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._is_due = False
+        self._notice = Notice(self._show)
+        self._job = ProposingJob(recording, self._notice.give, workspace.wait_for_answer)
         self._numbers: tuple[int, ...] = ()
         self._placements: tuple[Placement, ...] | None = None
         self._all: tuple[Placement, ...] = ()
@@ -73,7 +68,7 @@ class ProposingService:
 
     def start(self) -> None:
         """Begin to tell the pages, on the running loop."""
-        self._loop = asyncio.get_running_loop()
+        self._notice.start()
 
     def greet(self, outbox: Outbox) -> None:
         """Send the present state to a page that has just opened."""
@@ -136,11 +131,11 @@ class ProposingService:
         if not self._on:
             self._job.stop()
         self.follow()
-        self._changed()
+        self._notice.give()
 
     async def close(self) -> None:
         """Stop proposing, and tell the pages nothing more."""
-        self._loop = None
+        self._notice.stop()
         await asyncio.to_thread(self._job.close)
 
     def _obstacle(self) -> tuple[str, str] | None:
@@ -153,22 +148,9 @@ class ProposingService:
             return _GROWING
         return None
 
-    def _changed(self) -> None:
-        """Take note of progress, in any thread; the pages are told shortly afterwards."""
-        loop = self._loop
-        if loop is None or self._is_due:
-            return
-        self._is_due = True
-        try:
-            loop.call_soon_threadsafe(loop.call_later, _TELL_EVERY_S, self._show)
-        except RuntimeError:
-            _log.debug("proposals came after the server had stopped")
-
     def _show(self) -> None:
-        self._is_due = False
-        if self._loop is not None:
-            self._tell(self._news(), "proposals")
-            self._show_spots()
+        self._tell(self._news(), "proposals")
+        self._show_spots()
 
     def _show_spots(self) -> None:
         """Say which placements the images show, once all were looked at."""
