@@ -222,12 +222,9 @@ def _task_of_pairs(
     pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str]
 ) -> "_Task":
     checked_pairs(pairs, with_noise=True)
-    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options)
-
-
-def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
-    """Sort by image time; pairs without a time stay in the order given."""
-    return sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
+    # by image time; pairs without a time stay in the order given
+    ordered = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
+    return _Task.of(tuple(ordered), (), excluded, camera, options)
 
 
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:

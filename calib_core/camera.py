@@ -58,10 +58,7 @@ class CameraCovariance:
 
     def sigma(self, name: str) -> float:
         """Return the standard deviation of a parameter; 0 for one that is exact."""
-        return float(self.matrix[row, row] ** 0.5) if (row := self._row(name)) is not None else 0.0
-
-    def _row(self, name: str) -> int | None:
-        return self.order.index(name) if name in self.order else None
+        return float(self.matrix.diagonal()[self.order.index(name)] ** 0.5) if name in self.order else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

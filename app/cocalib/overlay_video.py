@@ -16,7 +16,7 @@ from calib_core.errors import InputError, MessageError, RecordingError
 from calib_core.file_tag import TAG
 from calib_core.measurements import NS_PER_S, Box, RadarScans, TimeNs
 from calib_core.recordings import SkippedFrames, WrittenVideo, video_format
-from calib_core.results import Calibration, PairResult
+from calib_core.results import Calibration
 from cocalib.colours import RETURN_RAMPS, residual_colours
 from cocalib.platform.files import whole_path
 from cocalib.recorded_view import FrameBlock, RecordedView, ReturnColours, SeenReturns, box_words, frame_blocks, seen_in
@@ -159,7 +159,8 @@ class Panels:
             frame[:rows, own] = panel
             below = strip.copy()
             if index == 0:
-                _write_changing(below, self._words(time))
+                letters = _letters(below)
+                label(below, self._words(time), (letters, _base_line(below)), _INK, letters)
             frame[rows:, own] = below
         return frame
 
@@ -176,15 +177,11 @@ class Panels:
         rows = seen.near(time)
         still = ~(np.abs(scans.doppler_mps[rows]) > calibration.options.gating.max_speed_mps)
         draw_returns(panel, seen.pixels_px[rows], colours.of(scans, rows), still)
-        pairs = self._pairs_at(time)
+        held = round(_HELD_S * NS_PER_S)
+        pairs = [pair for clicked, pairs in self._clicked if 0 <= time - clicked <= held for pair in pairs]
         if pairs:
             projected = calibration.reproject(np.array([pair.point_radar_m for pair in pairs]))
             draw_clicks(panel, np.array([pair.pixel_px for pair in pairs]), projected, [pair.id for pair in pairs])
-
-    def _pairs_at(self, time: TimeNs) -> tuple[PairResult, ...]:
-        """Return the pairs of this frame, and of those shortly before it."""
-        held = round(_HELD_S * NS_PER_S)
-        return tuple(pair for clicked, pairs in self._clicked if 0 <= time - clicked <= held for pair in pairs)
 
     def _words(self, time: TimeNs) -> str:
         words = time_text(time, self._start)
@@ -223,12 +220,6 @@ def _footers(width_px: int, height_px: int, colours: ReturnColours, titles: Sequ
             if width < left - _TITLE_FROM * width_px:
                 label(strip, title, (left - width - letters, _base_line(strip)), _DIM, letters)
     return strips
-
-
-def _write_changing(strip: np.ndarray, words: str) -> None:
-    """Write what changes from frame to frame at the left end of a strip."""
-    letters = _letters(strip)
-    label(strip, words, (letters, _base_line(strip)), _INK, letters)
 
 
 def _letters(strip: np.ndarray) -> float:

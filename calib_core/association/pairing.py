@@ -123,7 +123,10 @@ def _pairing(
         else:
             unpaired.append(problem)
     windows = [window_around(static, click.image_time, window_s=options.locating.window_s) for click in reachable]
-    elsewhere = () if background is None else _background_windows(background, windows, options)
+    elsewhere: tuple[RadarScans, ...] = ()
+    if background is not None:
+        still = static_returns(background, options.gating)
+        elsewhere = background_windows(still, windows, window_s=options.locating.window_s)
     pairs, empty = _paired(reachable, windows, static, elsewhere, options)
     shared = _windows_of_placements(reachable, windows, pairs, static, options)
     if shared is not windows:
@@ -131,13 +134,6 @@ def _pairing(
     unpaired += [_without_return(click, window, options) for click, window in empty]
     rank = {click.id: index for index, click in enumerate(sorted(clicks))}
     return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
-
-
-def _background_windows(
-    background: RadarScans, windows: Sequence[RadarScans], options: CalibrationOptions
-) -> tuple[RadarScans, ...]:
-    """Cut windows clear of the clicks from the scans of a recording."""
-    return background_windows(static_returns(background, options.gating), windows, window_s=options.locating.window_s)
 
 
 def _paired(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values, Vector3
+from calib_core.arrays import Values, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.best_fit import MIRRORED_GAIN, NOT_MIRRORED_GAIN
 from calib_core.geometry import camera_position_jacobian
@@ -103,7 +103,7 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
     if not heights_decide and not _is_measured(fit) and not _mirrored_on_rig(plane, fit):
         return []
     if sides is not None and sides.opposite and not sides.low_radar and not heights_decide:
-        return [_on_other_side(sides)]
+        return [DataWarning("mirrored-axes", {"camera_m": sides.camera_m, "radar_m": sides.radar_m})]
     gain = fit.best.mirror_gain(fit.options)
     if gain > MIRRORED_GAIN:
         return [DataWarning("mirrored-axes", {"log_likelihood_ratio": gain / 2.0})]
@@ -125,10 +125,6 @@ def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
     centre_m = fit.refined.camera_from_radar.inverse().translation_m
     reflected_m = centre_m - 2.0 * plane.height_m(centre_m)[0] * plane.axes[2]
     return float(np.linalg.norm(reflected_m)) <= fit.options.solving.reach_m
-
-
-def _on_other_side(sides: GroundSides) -> DataWarning:
-    return DataWarning("mirrored-axes", {"camera_m": sides.camera_m, "radar_m": sides.radar_m})
 
 
 def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
@@ -163,7 +159,9 @@ def _heights_decide(plane: _Plane) -> bool:
 
 
 def _plane(fit: SolvedFit) -> _Plane:
-    points, covariances = _placements(fit)
+    measurements, inliers = fit.refined.measurements, fit.refined.rows[fit.inliers]
+    points = cartesian_from_polar(measurements.polar[inliers])
+    covariances = covariance_from_sigma_polar(points, measurements.sigma_polar[inliers])
     weights = np.ones(len(points))
     for _ in range(_PLANE_ROUNDS):
         origin_m = (weights @ points) / weights.sum()
@@ -176,10 +174,3 @@ def _plane(fit: SolvedFit) -> _Plane:
     rows = np.concatenate([np.ones((len(points), 1)), offsets @ axes[:2].T], axis=1)
     covariance = np.linalg.pinv((rows * weights[:, None]).T @ rows) * max(excess, 1.0)
     return _Plane(origin_m, axes, covariance, distances)
-
-
-def _placements(fit: SolvedFit) -> tuple[Points3, np.ndarray]:
-    """Return the inliers' radar positions (n, 3) [m] and their covariances (n, 3, 3)."""
-    measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
-    points = cartesian_from_polar(measurements.polar[rows])
-    return points, covariance_from_sigma_polar(points, measurements.sigma_polar[rows])

@@ -48,7 +48,7 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
         limits: where the reflector can go.
     """
     clicks = [
-        _as_chosen(pair.measured, pair.candidate)
+        replace(pair.measured, candidates=pair.measured.candidates[pair.candidate : pair.candidate + 1])
         for pair in calibration.pairs
         if pair.inlier and pair.measured is not None
     ]
@@ -66,11 +66,6 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
     gain = float(np.sqrt(now / then[best]))
     pixel = calibration.camera.project(calibration.camera_from_radar @ places[best : best + 1])[0]
     return NextPlacement(places[best], pixel, gain, may_stop=gain < _ENOUGH_GAIN)
-
-
-def _as_chosen(pair: Pair, candidate: int) -> Pair:
-    """Return a pair with the chosen candidate alone."""
-    return replace(pair, candidates=pair.candidates[candidate : candidate + 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

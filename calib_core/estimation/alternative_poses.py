@@ -92,7 +92,9 @@ def find_agreeing_outliers(
         return None
     # a companion's camera may be anywhere
     free = replace(measurements, prior=measurements.prior.weakened()).some(outliers)
-    starts = _starts(free, refined.camera_from_radar, rng)
+    drawn = initial_poses(free, most=_STARTS, rng=rng)
+    fitted = refined.camera_from_radar  # a companion's pose is often near it
+    starts = (fitted, *(one.camera_from_radar for one in solve_gnc(free, drawn, estimate_scale=False)))
     posterior = pose_posterior(free, refined.camera_from_radar)
     as_assumed = np.zeros((len(starts), 4))
     modes = refine_poses(posterior, Poses.of(starts), as_assumed, share=_SHARE, rounds=_ROUNDS)
@@ -110,14 +112,6 @@ def find_agreeing_outliers(
         camera_move_m=float(np.linalg.norm(centres[0] - centres[1])),
         log_ratio=float(ratios[best]),
     )
-
-
-def _starts(
-    outliers: PairMeasurements, fitted: RigidTransform, rng: "np.random.Generator"
-) -> tuple[RigidTransform, ...]:
-    """Return refined hypotheses from few pairs, and the fit: a companion's pose is often near it."""
-    drawn = initial_poses(outliers, most=_STARTS, rng=rng)
-    return (fitted, *(one.camera_from_radar for one in solve_gnc(outliers, drawn, estimate_scale=False)))
 
 
 def _log_ratios(modes: Modes, free: CameraPrior) -> Values:

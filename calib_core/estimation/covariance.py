@@ -396,7 +396,10 @@ def smooth_rows(refined: ErrorsInVariablesFit, inliers: Indices, length_rad: flo
     Its size is that of the stated sigmas, or of the estimated ones where these are larger: a fit to smooth errors absorbs most of
     them, so that the rest seems quieter than stated, down to the share of the variance that is not smooth.
     """
-    directions = _directions(refined, inliers)
+    # azimuth and elevation (n, 2) of each inlier from its click: the measured angles contain the errors in question
+    rays = refined.measurements.rays[inliers] @ refined.camera_from_radar.rotation
+    directions = polar_from_cartesian(rays)[:, 1:]
+    directions = np.where(np.isfinite(directions), directions, refined.polar[1:, inliers].T)
     chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTERS)).round().astype(np.int64)
     centers = directions[chosen]
     values, vectors = np.linalg.eigh(_kernel(centers, centers, length_rad))
@@ -411,13 +414,6 @@ def smooth_rows(refined: ErrorsInVariablesFit, inliers: Indices, length_rad: flo
         gain = refined.model.point_jacobian[inliers, :, angle] * sigma[:, None, angle]  # G, (n, 2)
         parts.append((gain[:, :, None] * features[:, None, :]).reshape(2 * len(directions), -1))
     return np.concatenate(parts, axis=1)
-
-
-def _directions(refined: ErrorsInVariablesFit, inliers: Indices) -> Points2:
-    """Return azimuth and elevation (n, 2) of each inlier from its click: the measured angles contain the errors in question."""
-    rays = refined.measurements.rays[inliers] @ refined.camera_from_radar.rotation
-    directions = polar_from_cartesian(rays)[:, 1:]
-    return np.where(np.isfinite(directions), directions, refined.polar[1:, inliers].T)
 
 
 def _kernel(a: Points2, b: Points2, length_rad: float) -> np.ndarray:

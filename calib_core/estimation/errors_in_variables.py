@@ -176,7 +176,9 @@ def fit_errors_in_variables(
     rows = associate(noisy, start.camera_from_radar)[0]
     pose, errors = start.camera_from_radar, measurements.errors.values
     state = _State(pose, None, rows, noisy.measured(rows), scale, INLIER_SHARE, errors)
-    state.weights = _first_weights(noisy, state)
+    # by their plain residuals, because there is no fit yet to predict them from
+    odds = log_odds_of(noisy, _model(noisy, state), noisy.log_score[state.rows], state.share)
+    state.weights = _probability(odds)
     degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
         noisy = measurements.scaled(state.scale).with_errors(state.errors)
@@ -206,12 +208,6 @@ def _downweight_ambiguous(weights: Values, undecided: Flags) -> Values:
     asked = inliers & undecided
     few = asked.sum() <= _MOST_ASKED * len(weights) and (inliers & ~asked).sum() >= _LEAST_DECIDED
     return np.where(asked, _HALF, weights) if few else weights
-
-
-def _first_weights(measurements: PairMeasurements, state: _State) -> Values:
-    """Weight pairs by their plain residuals, because there is no fit yet to predict them from."""
-    odds = log_odds_of(measurements, _model(measurements, state), measurements.log_score[state.rows], state.share)
-    return _probability(odds)
 
 
 def _probability(odds: Values) -> Values:

@@ -152,10 +152,6 @@ def _shares(inside: Flags, frames: Indices) -> tuple[Values, Indices]:
     return np.bincount(own, weights=inside) / np.maximum(np.bincount(own), 1), rows
 
 
-def _mean_share(inside: Flags, frames: Indices) -> float:
-    return float(_shares(inside, frames)[0].mean())
-
-
 def _turn_points(points_camera_m: Points3, axis: Vector3, angle_deg: float) -> np.ndarray:
     return points_camera_m @ rotation_exp(np.deg2rad(angle_deg) * np.asarray(axis)).T
 
@@ -248,7 +244,8 @@ def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -
     """Return the mean Acc of the calibration turned by 10 deg to the left and to the right."""
     yaw = np.array(AXES["yaw"])
     pixels = [seen_pixels(_turn_points(points_camera_m, yaw, side * _CHANCE_DEG), camera) for side in (-1.0, 1.0)]
-    return float(np.mean([_mean_share(inside_own_boxes(pixel, counted.boxes_px), counted.frames) for pixel in pixels]))
+    means = [_shares(inside_own_boxes(pixel, counted.boxes_px), counted.frames)[0].mean() for pixel in pixels]
+    return float(np.mean(means))
 
 
 def _area_chance(counted: CountedReturns, camera: Camera) -> float:

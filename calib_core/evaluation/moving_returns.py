@@ -113,7 +113,8 @@ def moving_returns(windows: Iterable[RadarScans], options: TargetOptions) -> Mov
     rows = np.concatenate([np.zeros(0, dtype=np.int64), *(piece.rows for piece in pieces)])
     searched = sum(piece.searched for piece in pieces)
     if sum(piece.unknown for piece in pieces) > _UNKNOWN_SHARE * searched:
-        return MovingReturns(scans, rows, np.full(len(rows), np.nan), False, False, searched, _without_doppler(options))
+        warning = DataWarning("no-doppler", {"assumed": options.sensors != "still"})
+        return MovingReturns(scans, rows, np.full(len(rows), np.nan), False, False, searched, (warning,))
     fitted, unfitted, judged = (
         sum(getattr(piece, name) for piece in pieces) for name in ("fitted", "unfitted", "judged")
     )
@@ -166,10 +167,6 @@ def _usable(scans: RadarScans, options: TargetOptions) -> Flags:
         first = np.unique(keys, axis=0, return_index=True)[1] if len(keys) else np.zeros(0, dtype=np.int64)
         usable[np.delete(numbered, first)] = False
     return np.asarray(usable)
-
-
-def _without_doppler(options: TargetOptions) -> tuple[DataWarning, ...]:
-    return (DataWarning("no-doppler", {"assumed": options.sensors != "still"}),)
 
 
 def _unclear(unfitted: int, judged: int) -> tuple[DataWarning, ...]:

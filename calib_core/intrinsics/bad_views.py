@@ -211,7 +211,9 @@ def _misfit(view: ViewStack, fits: _Fits, row: int) -> str:
     apart = float(np.sqrt(squares[0])) if np.isfinite(squares[0]) and posed.corner_counts[0] else float("inf")
     if not apart < _NO_POSE_SHARE * max(view.size_px):
         return "no pose of the board puts its corners where they were found: another board, or a wrong detection"
-    stretched = _stretch(view)
+    directions = np.zeros((1, int(view.corner_ids.max()) + 1, 3))
+    directions[0, view.corner_ids[0], 0] = view.board_m[0, 0]
+    stretched = BoardWarp(("stretch",), directions)  # makes the rows of the board longer
     other = adjust(state, posed, Freedom(np.zeros((len(state.camera.parameters), 0)), stretched))
     left = float(np.sqrt(view.mean_square(residuals_of(other, view, stretched))[0]))
     ratio = 1.0 + float(other.amounts[0])
@@ -224,13 +226,6 @@ def _misfit(view: ViewStack, fits: _Fits, row: int) -> str:
         f"its corners fit to {apart:.2f} px in any pose of the board, those of the others to {typical:.2f} px: another board, a "
         "wrong detection, or blurred by motion"
     )
-
-
-def _stretch(view: ViewStack) -> BoardWarp:
-    """Return the warp of one view's board that makes its rows longer."""
-    directions = np.zeros((1, int(view.corner_ids.max()) + 1, 3))
-    directions[0, view.corner_ids[0], 0] = view.board_m[0, 0]
-    return BoardWarp(("stretch",), directions)
 
 
 _COPY_SHARE = (

@@ -305,7 +305,9 @@ def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[Boar
         board: that they show.
     """
     left_out: list[LeftOutImage] = []
-    sharp_px = _usual_blur_px(views)
+    known = np.array([view.blur_px for view in views])
+    known = known[np.isfinite(known)]
+    sharp_px = float(np.quantile(known, _SHARP_SHARE)) if len(known) else float("inf")
     limit_px = max(_BLURRED_FACTOR * sharp_px, sharp_px + _BLURRED_PX)
     sharp = []
     for view in views:
@@ -338,13 +340,6 @@ def outline_px(view: BoardCorners, board: Board) -> Points2:
         middle = view.pixels_px.mean(axis=0)
         return np.repeat(middle[None], 4, axis=0)
     return np.asarray(cv2.perspectiveTransform(outer[:, None], homography)[:, 0])
-
-
-def _usual_blur_px(views: Sequence[BoardCorners]) -> float:
-    """Return the blur of the sharper ones; infinite where none was measured."""
-    known = np.array([view.blur_px for view in views])
-    known = known[np.isfinite(known)]
-    return float(np.quantile(known, _SHARP_SHARE)) if len(known) else float("inf")
 
 
 def _without_duplicates(views: Sequence[BoardCorners], outlines: np.ndarray, left_out: list[LeftOutImage]) -> list[int]:

@@ -130,7 +130,9 @@ def _views_to_use(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     if len(views) < _LEAST_VIEWS:
         return _too_few(len(views), left_out)
     stack = stack_views(views, board_m, search.size_px)
-    states = _starts(stack, model)
+    models = MODELS[1:] if model == "auto" else (model,)
+    # each fitted robustly to all views, those that are wrong included
+    states = [state for one in models if (state := start(one, stack)) is not None]
     if not states:
         return Unsolvable("no-lens", {"views": len(views), "why": "no focal length explains them", "model": model})
     judged = _judge_by_best_lens(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
@@ -162,12 +164,6 @@ def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> st
 
 def _too_few(count: int, left_out: Sequence[LeftOutImage]) -> Unsolvable:
     return Unsolvable("few-views", {"views": count, "needed": _LEAST_VIEWS, "left_out": tuple(left_out)})
-
-
-def _starts(stack: ViewStack, model: LensChoice) -> list[LensState]:
-    """Fit each lens model robustly to all views, those that are wrong included."""
-    models = MODELS[1:] if model == "auto" else (model,)
-    return [state for one in models if (state := start(one, stack)) is not None]
 
 
 def _judge_by_best_lens(
@@ -295,7 +291,9 @@ def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[D
 
 
 def _view_warnings(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
-    covered = _covered_share(stack)
+    found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
+    hull = cv2.convexHull(found.astype(np.float32))
+    covered = float(cv2.contourArea(hull) / (stack.size_px[0] * stack.size_px[1]))
     if covered < _LEAST_COVERED:
         yield DataWarning("little-covered", {"share": covered})
     if len(stack) < _FEW_VIEWS:
@@ -315,13 +313,6 @@ def _number_warnings(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
         yield DataWarning("unequal-focal-lengths", {"fx_px": fx, "fy_px": fy})
     if rms_px > _LARGE_RMS_PX:
         yield DataWarning("large-residuals", {"rms_px": rms_px})
-
-
-def _covered_share(stack: ViewStack) -> float:
-    """Return which share of the image lies in the convex hull of all corners."""
-    found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
-    hull = cv2.convexHull(found.astype(np.float32))
-    return float(cv2.contourArea(hull) / (stack.size_px[0] * stack.size_px[1]))
 
 
 def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled: bool) -> Iterator[DataWarning]:

@@ -91,7 +91,8 @@ def _view_share(view: BoardCorners, board: Board, size_px: tuple[int, int]) -> _
     shares = (view.pixels_px + 0.5) / np.array(size_px)
     column, row = np.clip((shares * (_CELLS[1], _CELLS[0])).astype(int), 0, (_CELLS[1] - 1, _CELLS[0] - 1)).T
     covered = np.zeros(_FINE, dtype=np.uint8)
-    distance = _distance(_cover(shares, covered))
+    share = _cover(shares, covered)
+    distance = "near" if share > _NEAR else "far" if share < _FAR else "middle"
     return _ViewShare((row, column), covered.astype(bool), distance, _tilts(view, board))
 
 
@@ -102,10 +103,6 @@ def _cover(shares: np.ndarray, covered: np.ndarray) -> float:
     hull = cv2.convexHull((shares * (_FINE[1], _FINE[0])).astype(np.float32))
     cv2.fillConvexPoly(covered, np.floor(hull).astype(np.int32), 1)
     return float(cv2.contourArea(hull)) / covered.size
-
-
-def _distance(share: float) -> str:
-    return "near" if share > _NEAR else "far" if share < _FAR else "middle"
 
 
 def _tilts(view: BoardCorners, board: Board) -> tuple[str, ...]:

@@ -71,15 +71,11 @@ def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> Writt
         lens.coefficients[longest.coefficients : len(distortion)],
     )
     missing = left_out[0] if len(left_out) == 1 else f"{left_out[0]} to {left_out[-1]}"
+    other = "opencv" if any(known.where == "opencv" for known in lens.names_elsewhere) else "json"  # stores all of them
     raise InputError(
         f"{_TITLES[where]}'s {longest.name} model has no {missing}, which this camera uses; "
-        f"export with --to {_format_for(lens)}, or calibrate the camera with {' '.join(kept)} only"
+        f"export with --to {other}, or calibrate the camera with {' '.join(kept)} only"
     )
-
-
-def _format_for(lens: LensModel) -> str:
-    """Return the name of a format that can store every coefficient."""
-    return "opencv" if any(known.where == "opencv" for known in lens.names_elsewhere) else "json"
 
 
 def lenses_named(where: Elsewhere, name: str) -> tuple[LensModel, ...]:

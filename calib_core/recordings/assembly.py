@@ -127,7 +127,9 @@ def assemble(
     selection = select(inventory, options, require)
     stamped = _stamped(selection, inventory)
     choice = _radar_choice(selection, stamped, inventory)
-    used = _topics_to_use(selection, choice, stamped)
+    by_name = {topic.name: topic for topic in selection.radars}
+    radars = choice.sensors[0].topics if choice.sensors else tuple(by_name)[:1]  # without a choice, the only one
+    used = _Used(tuple(by_name[name] for name in radars), selection.image, selection.camera_info)
     lost = [
         warning for topic in used.all for warning in lost_message_warnings(topic.name, len(topic), stamped[topic.name])
     ]
@@ -214,13 +216,6 @@ class _Used:
         """Leave out the unreadable messages."""
         radars = tuple(stamped[topic.name].topic for topic in self.radars)
         return replace(self, radars=radars, image=stamped[self.image.name].topic if self.image else None)
-
-
-def _topics_to_use(selection: Selection, choice: RadarChoice, stamped: Mapping[str, StampedTopic]) -> _Used:
-    """Keep the topics of the chosen radar; without a choice, the only one."""
-    by_name = {topic.name: topic for topic in selection.radars}
-    names = choice.sensors[0].topics if choice.sensors else tuple(topic.name for topic in selection.radars[:1])
-    return _Used(tuple(by_name[name] for name in names), selection.image, selection.camera_info)
 
 
 def _usage(topic: Topic, stated: StatedReading) -> Usage:

@@ -153,7 +153,8 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     timed = used or recording.topics
     start = min((topic.start.time for topic in timed if topic.start is not None), default=None)
     end = max((topic.end.time for topic in timed if topic.end is not None), default=None)
-    shared = _shared(recording)
+    radar, images = recording.radar_times, recording.image_times
+    shared = shared_time(radar, images) if len(radar) and len(images) else None
     return RecordingSummary(
         files=files_of(recording),
         start=Stamp.of(start) if start is not None else None,
@@ -186,11 +187,6 @@ class SharedTime:
 
     seconds: float
     stretches: int
-
-
-def _shared(recording: Recording) -> SharedTime | None:
-    radar, images = recording.radar_times, recording.image_times
-    return shared_time(radar, images) if len(radar) and len(images) else None
 
 
 def _radar(recording: Recording) -> RadarSummary | None:

@@ -164,14 +164,11 @@ class Topic:
             return None
         starts = np.array(offsets, dtype=np.int64)[self.part]
         words = np.take_along_axis(heads, starts[:, None] + np.arange(8), axis=1)
-        big = self._big_endian(heads)
+        cdr = np.array([channel.encoding == "cdr" for _, channel in self.parts])[self.part]
+        big = cdr & (heads[:, 1] == 0)
         words[big] = words[big][:, [3, 2, 1, 0, 7, 6, 5, 4]]
         pairs = np.ascontiguousarray(words).view("<u4").astype(np.int64)
         return pairs[:, 0] * NS_PER_S + pairs[:, 1]
-
-    def _big_endian(self, heads: np.ndarray) -> np.ndarray:
-        cdr = np.array([channel.encoding == "cdr" for _, channel in self.parts])[self.part]
-        return np.asarray(cdr & (heads[:, 1] == 0))
 
 
 def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: bool = False) -> list[Heads]:

@@ -39,7 +39,8 @@ def true_boxes(recording: SimulatedRecording) -> Boxes:
     solids = [block(item) for item in stage.scene.solids]
     frames = []
     for moment_s, stamp in zip(stage.frame_times.moment_s, stage.frame_times.header_ns, strict=True):
-        actors = _actors(stage, float(moment_s))
+        people = stage.story.people_at(float(moment_s), person=stage.options.person)
+        actors = (*people, *stage.story.at(float(moment_s)).traffic)
         boxes = [_box(stage, actor, actors, solids) for actor in actors]
         frames.append(FrameBoxes(TimeNs(int(stamp)), tuple(box for box in boxes if box is not None)))
     camera = recording.camera
@@ -53,11 +54,6 @@ def true_labels(recording: SimulatedRecording) -> ReturnLabels:
         LabelledScan(scan.time, tracks) for antenna in stage.antennas for scan, tracks in labelled_scans(stage, antenna)
     )
     return ReturnLabels(tuple(sorted(scans, key=lambda scan: scan.radar_time)), "the simulation")
-
-
-def _actors(stage: Stage, time_s: float) -> tuple[Actor, ...]:
-    people = stage.story.people_at(time_s, person=stage.options.person)
-    return (*people, *stage.story.at(time_s).traffic)
 
 
 def _box(stage: Stage, actor: Actor, actors: tuple[Actor, ...], solids: list[Solid]) -> Box | None:

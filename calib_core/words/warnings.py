@@ -394,10 +394,6 @@ def _away_text(away_deg: float, away_cm: float) -> str:
     return f"{away_deg:.1f} deg and {away_cm:.0f} cm away"
 
 
-def _away_text_in_sigmas(away_deg: float, away_cm: float, sigmas: float) -> str:
-    return f"{away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} σ)"
-
-
 def camera_far_away(
     *,
     expected_m: float,
@@ -424,7 +420,8 @@ def camera_far_away(
             SetOption("solving.nominal_camera_distance_m"),
         )
     return remark(
-        f"another pose, {_away_text_in_sigmas(away_deg, away_cm, sigmas)}, explains the pairs as well; the one with the camera "
+        f"another pose, {away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} σ), explains the pairs as well; the one "
+        "with the camera "
         f"{here_m:.1f} m from the radar, not {there_m:.1f} m, was chosen only because about {expected_m:g} m is expected",
         say(
             "are both sensors on the same rig, or how far apart? Set {distance}, or measure the camera position",

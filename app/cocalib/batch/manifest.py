@@ -127,7 +127,7 @@ def read_manifest(path: Path) -> Manifest:
     Raises:
         InputError: it cannot be read; a key is unknown or has a wrong value; two rows are of one session.
     """
-    text = _text(path)
+    text = read_text(path, is_what="a manifest", max_bytes=_MOST_BYTES, if_missing=f"write one, with {_EXAMPLE}")
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a manifest is a .toml file, with {_EXAMPLE}")
     places, content = _toml(text, path)
@@ -143,10 +143,6 @@ def read_manifest(path: Path) -> Manifest:
     _require_different(rows, path)
     _require_own_recordings(rows, path)
     return Manifest(path, rows)
-
-
-def _text(path: Path) -> str:
-    return read_text(path, is_what="a manifest", max_bytes=_MOST_BYTES, if_missing=f"write one, with {_EXAMPLE}")
 
 
 def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:

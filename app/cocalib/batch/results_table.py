@@ -139,15 +139,11 @@ def _row(results: ResultsFolder, vehicle: str, session: str, digest: str) -> Ses
             raise InputError(
                 f"{row.folder}/{OUTCOME_FILE}: is of another job; delete its folder and run the batch again"
             )
-        row = _of_outcome(row, outcome)
+        shared = {name: getattr(outcome, name) for name in ("status", "verdict", "aed_px", "pairs", "reason", "hint")}
+        row = replace(row, recorded=_iso_time(outcome.recorded_ns), **shared)
         return _with_pose(row, _calibration(results, outcome)) if outcome.verdict in _WITH_POSE else row
     except CalibrationError as error:
         return replace(row, status="unreadable", reason=str(error), hint="")
-
-
-def _of_outcome(row: SessionRow, outcome: Outcome) -> SessionRow:
-    shared = ("status", "verdict", "aed_px", "pairs", "reason", "hint")
-    return replace(row, recorded=_iso_time(outcome.recorded_ns), **{name: getattr(outcome, name) for name in shared})
 
 
 def _calibration(results: ResultsFolder, outcome: Outcome) -> Calibration:

@@ -155,7 +155,11 @@ def run_job(job: Job, results: Path) -> Outcome:
             log = "\n\n".join(result.log)
             files = {**result.files, **({LOG_FILE: log.encode(errors="backslashreplace")} if log else {})}
             return _write_outcome(replace(outcome, run=run()), files, job, results)
-    return replace(failed(job, _changed_input(job)), run=run())
+    changed = Failure(
+        f"{job.row.name}: an input changed after the batch was started, so nothing is kept",
+        "run the batch again once the files are complete",
+    )
+    return replace(failed(job, changed), run=run())
 
 
 def _write_outcome(outcome: Outcome, files: Mapping[str, bytes], job: Job, results: Path) -> Outcome:
@@ -169,7 +173,11 @@ def _write_outcome(outcome: Outcome, files: Mapping[str, bytes], job: Job, resul
             outcome = replace(outcome, files=listed_files(folder))
             (folder / OUTCOME_FILE).write_text(outcome_text(outcome), encoding="utf-8")
     except (OSError, CalibrationError) as error:
-        return replace(failed(job, _unwritten(results, error)), run=outcome.run)
+        failure = Failure(
+            f"{results}: the result cannot be written: {getattr(error, 'strerror', None) or error}",
+            "make room, or name another folder with --out, and run the batch again: what is done is kept",
+        )
+        return replace(failed(job, failure), run=outcome.run)
     return outcome
 
 
@@ -186,20 +194,6 @@ class Failure:
     reason: str
     hint: str = ""
     is_final: bool = False
-
-
-def _changed_input(job: Job) -> Failure:
-    return Failure(
-        f"{job.row.name}: an input changed after the batch was started, so nothing is kept",
-        "run the batch again once the files are complete",
-    )
-
-
-def _unwritten(results: Path, error: OSError | CalibrationError) -> Failure:
-    return Failure(
-        f"{results}: the result cannot be written: {getattr(error, 'strerror', None) or error}",
-        "make room, or name another folder with --out, and run the batch again: what is done is kept",
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -263,7 +257,9 @@ def _after_solving(row: ManifestRow, solved: SolvedSession, recording: Recording
     judged = _step("evaluate", result, lambda: judge_session(row, solved, recording))
     if judged is not None:
         result.files[EVALUATION_FILE] = judged.text.encode()
-    _report(solved, judged, recording, result)
+    report = _step("report", result, lambda: report_session(solved, judged, recording))
+    if report is not None:
+        result.files[REPORT_FILE] = report.encode()
     if not row.exports:
         result.states["export"] = "not asked"
         return
@@ -275,12 +271,6 @@ def _after_solving(row: ManifestRow, solved: SolvedSession, recording: Recording
         result.files |= files or {}
     states = [result.states.pop(f"export {name}") for name in dict.fromkeys(row.exports)]
     result.states["export"] = "failed" if "failed" in states else "done"
-
-
-def _report(solved: SolvedSession, judged: JudgedSession | None, recording: Recording, result: SessionResult) -> None:
-    text = _step("report", result, lambda: report_session(solved, judged, recording))
-    if text is not None:
-        result.files[REPORT_FILE] = text.encode()
 
 
 def _step(name: str, result: SessionResult, work: Callable[[], _Made]) -> _Made | None:

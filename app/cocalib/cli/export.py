@@ -70,7 +70,9 @@ class Export:
             return self._print_list()
         if self.to not in ("list", "all"):
             format_named(self.to)
-        file = self._calibration()
+        if len(self.calibration) != 1:
+            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
+        file = _own_calibration(self.calibration[0])
         if self._is_refused(file):
             return IN_DOUBT
         if self.trees.into:
@@ -139,11 +141,6 @@ class Export:
             names = ", ".join(name for name, made in written.items() if note in made.notes)
             print(f"note: {names}: {note}", file=sys.stderr)
         return 0
-
-    def _calibration(self) -> "CalibrationFile":
-        if len(self.calibration) != 1:
-            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
-        return _own_calibration(self.calibration[0])
 
     def _is_refused(self, file: "CalibrationFile") -> bool:
         """Say that a contradictory calibration is not written, unless the user wants it."""

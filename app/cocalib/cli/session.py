@@ -161,7 +161,7 @@ def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
             each.state,
             str(each.clicks),
             str(each.steps),
-            _when(each.changed_at_s),
+            "?" if each.changed_at_s is None else f"{datetime.fromtimestamp(each.changed_at_s):%Y-%m-%d %H:%M:%S}",
             each.recording or "?",
             str(each.folder),
         )
@@ -192,7 +192,3 @@ def _document(session: "SessionSummary") -> dict[str, object]:
 def _printable(text: str) -> str:
     """Replace what a terminal would act on: names in a session file are whatever was written there."""
     return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
-
-
-def _when(changed_at_s: float | None) -> str:
-    return "?" if changed_at_s is None else f"{datetime.fromtimestamp(changed_at_s):%Y-%m-%d %H:%M:%S}"

@@ -211,7 +211,7 @@ def judged_calibration(
     return JudgedCalibration(
         imported,
         calibration,
-        tuple(_meaning_warning(path, one) for one in lens),
+        tuple(DataWarning.reported(one.code, f"{path.name}: {one.message}", one.hint) for one in lens),
     )
 
 
@@ -230,7 +230,3 @@ def require_size(camera: Camera, recording: Recording, path: Path) -> None:
             f"{path}: calibrated for images of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
             f"{wanted[1]} px; give the calibration of this camera"
         )
-
-
-def _meaning_warning(path: Path, result: CheckResult) -> DataWarning:
-    return DataWarning.reported(result.code, f"{path.name}: {result.message}", result.hint)

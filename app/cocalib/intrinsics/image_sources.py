@@ -246,7 +246,8 @@ def open_images(paths: Sequence[Path], options: RecordingOptions | None = None) 
     found = require_files(spelled_out(paths))
     kinds = {_kind(path) for path in found}
     if len(kinds) > 1:
-        named = ", ".join(f"{path.name}: {_kind(path)}" for path in (found[0], _first_of_another_kind(found)))
+        other = next(path for path in found if _kind(path) != _kind(found[0]))
+        named = f"{found[0].name}: {_kind(found[0])}, {other.name}: {_kind(other)}"
         raise InputError(
             f"{len(found)} sources of different kinds ({named}); give either a recording, one video, one folder of images, or "
             "image files"
@@ -313,7 +314,3 @@ def _kind(path: Path) -> str:
     if suffix in IMAGE_SUFFIXES:
         return "an image"
     return "a video" if suffix in VIDEO_SUFFIXES else "a recording"
-
-
-def _first_of_another_kind(paths: Sequence[Path]) -> Path:
-    return next(path for path in paths if _kind(path) != _kind(paths[0]))

@@ -228,7 +228,8 @@ def serve(first: Choice | None, serving: Serving) -> int:
             except KeyboardInterrupt:
                 if not was_served and choice is not None and not problem.words:
                     raise
-                _say_stopped()
+                with contextlib.suppress(OSError):  # the terminal may be gone
+                    print("\nStopped.")
                 return 2 if problem.words and not was_served else 0
             choice = chooser.take()
             service.start_over(_opening(choice))
@@ -291,11 +292,6 @@ def _ask(choice: Choice | None, problem: str, service: Service, chooser: Recordi
         with error_boundary("listing what can be chosen", lambda _line: None):  # `problem` says what is wrong
             choices = _choices_after(choice, problem)
     service.ask(chooser.put(choices, choice))
-
-
-def _say_stopped() -> None:
-    with contextlib.suppress(OSError):  # the terminal may be gone
-        print("\nStopped.")
 
 
 def _service(first: Choice | None, serving: Serving, chooser: RecordingChooser) -> Service:

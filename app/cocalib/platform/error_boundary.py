@@ -16,7 +16,6 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from importlib import metadata
-from pathlib import Path
 
 from cocalib.platform.resources import state_folder, version
 from cocalib.platform.terminal import escaped
@@ -129,13 +128,8 @@ def _saved(text: str) -> str:
         descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(text)
-        _remove_old(folder)
+        for old in sorted(folder.glob("error-*.txt"))[:-_MOST_REPORTS]:  # the names sort by time
+            old.unlink(missing_ok=True)
     except OSError as error:
         return f"and its report could not be saved ({error.strerror or error}); {_DEBUG}=1 shows it"
     return f"and a report is saved in {path}"
-
-
-def _remove_old(folder: Path) -> None:
-    """Keep the newest reports; their names sort by time."""
-    for old in sorted(folder.glob("error-*.txt"))[:-_MOST_REPORTS]:
-        old.unlink(missing_ok=True)

@@ -165,8 +165,9 @@ def _residuals_over_the_image(lens: CalibratedLens) -> Markup:
     longest = float(np.hypot(*means[there].T).max()) if there.any() else 0.0
     gain = _LONGEST / max(longest, 1e-9)
     shapes: list[Child] = [_image_frame(camera)]
+    scale = _WIDTH / camera.width_px
     for x, y, (du, dv) in zip(x_px[there], y_px[there], means[there].tolist(), strict=True):
-        at_u, at_v = _places(camera, x, y)
+        at_u, at_v = (x + 0.5) * scale, (y + 0.5) * scale
         shapes.append(tag("line", x1=at_u, y1=at_v, x2=at_u + gain * du, y2=at_v + gain * dv, class_="vector"))
         shapes.append(tag("circle", cx=at_u, cy=at_v, r=1.6, class_="used"))
     said = (
@@ -251,11 +252,6 @@ def _image_frame(camera: Camera) -> Markup:
 
 def _height(camera: Camera) -> float:
     return _WIDTH * camera.height_px / camera.width_px
-
-
-def _places(camera: Camera, u_px: float, v_px: float) -> tuple[float, float]:
-    scale = _WIDTH / camera.width_px
-    return (u_px + 0.5) * scale, (v_px + 0.5) * scale
 
 
 def _image_map(alternative: str, camera: Camera, *shapes: Child) -> Markup:

@@ -99,18 +99,15 @@ def view(
         advice=advice_for(calibration, verdict) if calibration else None,
         reference=reference.name if reference else "",
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
-        assumptions=_assumptions(session, facts),
+        assumptions=tuple(
+            AssumptionRow(one.text, str(sentence(one.text)), str(sentence(one.hint)))
+            for one in facts.unconfirmed(session)
+        ),
         verdict=verdict_row(verdict, session, left),
         placements=states,
         dismissed=session.dismissed,
         reviewed=session.reviewed,
         acknowledged=session.acknowledged,
-    )
-
-
-def _assumptions(session: Session, facts: RecordingFacts) -> tuple[AssumptionRow, ...]:
-    return tuple(
-        AssumptionRow(one.text, str(sentence(one.text)), str(sentence(one.hint))) for one in facts.unconfirmed(session)
     )
 
 
@@ -164,7 +161,7 @@ def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
     lines = ["verdict: " + verdict_line(verdict)]
     lines += ["assumes: " + assumed_words(verdict.assumed)] if verdict.assumed else []
     lines += ["next: " + sentence(action_words(verdict))]
-    rows = [words(_line(figure, width)) for figure in figures]
+    rows = [words(f"{figure.label:<{width}}  {figure.value} {figure.unit}".rstrip()) for figure in figures]
     if assumed:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
         rows.insert(len(pose), words(f"assumed, because this radar measures no elevation: {parts}"))
@@ -200,10 +197,6 @@ def _placements(calibration: Calibration) -> tuple[Figure, ...]:
         return ()
     count = len(linked_clicks(pairs, calibration.options))
     return (Figure("placements", "placements (pairs)", f"{count}", "", ""),)
-
-
-def _line(figure: Figure, width: int) -> str:
-    return f"{figure.label:<{width}}  {figure.value} {figure.unit}".rstrip()
 
 
 _MOST_NAMED = 6

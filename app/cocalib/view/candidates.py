@@ -104,7 +104,8 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
         for i, candidate in enumerate(candidates)
     ]
     order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
-    rival = _rival_index(calibration, pair, candidates)
+    rivals = () if calibration is None else [one.rival for one in calibration.pairs if one.id == pair.id]
+    rival = next((_index_at(pair.candidates[i].position_radar_m, candidates) for i in rivals if i >= 0), -1)
     better = _better_index(fits, used) if rival < 0 else rival
     asked = tuple(order.index(i) for i in (used, better) if i >= 0) if better >= 0 and pair.chosen is None else ()
     return PairCandidates(pair.id, session.revision, tuple(rows[i] for i in order), asked)
@@ -131,12 +132,6 @@ def _used_index(calibration: Calibration | None, pair: Pair, candidates: Sequenc
     if calibration is None:
         return 0 if pair.chosen is not None else -1
     return _index_at(next(one.point_radar_m for one in calibration.pairs if one.id == pair.id), candidates)
-
-
-def _rival_index(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
-    """Return the index of the candidate that explains the click as well as the one in use; -1 if there is none."""
-    rivals = () if calibration is None else [one.rival for one in calibration.pairs if one.id == pair.id]
-    return next((_index_at(pair.candidates[rival].position_radar_m, candidates) for rival in rivals if rival >= 0), -1)
 
 
 def _index_at(position_m: Vector3, candidates: Sequence[Candidate]) -> int:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Flags, Values
+from calib_core.arrays import Flags
 from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
@@ -64,7 +64,9 @@ def reprojections(pairs: tuple[PairResult, ...]) -> Mapping[str, Reprojection]:
     if not pairs:
         return {}
     ellipses = ellipses_of([pair.expected_covariance_px2 for pair in pairs])
-    steps_px = _steps_px(ellipses)
+    lengths_px = np.array([0.0 if ellipse is None else ellipse.semi_major_px for ellipse in ellipses])
+    # what the pixels of each pair are rounded to
+    steps_px = 2.0 ** np.floor(np.log2(np.clip(_SHARE * lengths_px, _FINEST_PX, _COARSEST_PX)))
     projected = np.round(np.array([pair.projected_px for pair in pairs]) / steps_px[:, None]) * steps_px[:, None]
     polar = polar_from_cartesian(np.array([pair.point_radar_m for pair in pairs]))
     polar[:, 1:] = np.rad2deg(polar[:, 1:])
@@ -102,12 +104,6 @@ def length_px(distance_px: float, step_px: float) -> float:
 
 def _rounded(probability: float) -> float | None:
     return None if math.isnan(probability) else round(float(probability), _DECIMALS_PROBABILITY)
-
-
-def _steps_px(ellipses: Sequence[Ellipse | None]) -> Values:
-    """Return the step (n,) to which pixels of each pair are rounded [px]."""
-    lengths_px = np.array([0.0 if ellipse is None else ellipse.semi_major_px for ellipse in ellipses])
-    return np.asarray(2.0 ** np.floor(np.log2(np.clip(_SHARE * lengths_px, _FINEST_PX, _COARSEST_PX))))
 
 
 def _in_steps(ellipse: Ellipse, step_px: float) -> Ellipse:

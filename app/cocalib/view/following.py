@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from calib_core.diagnostics.next_placement import ENOUGH_PLACEMENTS, Coverage, Place
+from calib_core.diagnostics.next_placement import ENOUGH_PLACEMENTS, Coverage
 from calib_core.results import NextPlacement
 from calib_core.words.verdict import placement_words
 
@@ -63,7 +63,8 @@ def advice_words(coverage: Coverage, best: NextPlacement | None) -> str:
     if coverage.next is not None:
         total = f"{coverage.placements} of {ENOUGH_PLACEMENTS} placements"
         few = total if coverage.placements < ENOUGH_PLACEMENTS else _count(coverage.placements)
-        return f"{few}; next: {_where(coverage.next)}{_height(coverage)}."
+        where = f"{_SIDES[coverage.next.side]}, {coverage.next.near_m:g} to {coverage.next.far_m:g} m away"
+        return f"{few}; next: {where}{_height(coverage)}."
     return (
         f"{_count(coverage.placements)}, near and far and on both sides: enough for a calibration{_height(coverage)}."
     )
@@ -71,10 +72,6 @@ def advice_words(coverage: Coverage, best: NextPlacement | None) -> str:
 
 def _count(placements: int) -> str:
     return f"{placements} placement{'' if placements == 1 else 's'}"
-
-
-def _where(place: Place) -> str:
-    return f"{_SIDES[place.side]}, {place.near_m:g} to {place.far_m:g} m away"
 
 
 def _height(coverage: Coverage) -> str:

@@ -122,7 +122,11 @@ class FrameStore:
             frame = await asyncio.get_running_loop().run_in_executor(self._executor, make, index)
         finally:
             self._coming.pop(key, None)
-        self._keep(key, frame)
+        self._kept[key] = frame
+        self._kept_bytes += len(frame.data)
+        while self._kept_bytes > self._budget_bytes and len(self._kept) > 1:
+            _, dropped = self._kept.popitem(last=False)
+            self._kept_bytes -= len(dropped.data)
         return frame
 
     def _rectified(self, camera: Camera | None, index: int) -> Frame:
@@ -145,13 +149,6 @@ class FrameStore:
             for key in [key for key in table if key[1] == "rectified"]:
                 dropped = table.pop(key)
                 self._kept_bytes -= len(dropped.data) if isinstance(dropped, Frame) else 0
-
-    def _keep(self, key: tuple[int, Size], frame: Frame) -> None:
-        self._kept[key] = frame
-        self._kept_bytes += len(frame.data)
-        while self._kept_bytes > self._budget_bytes and len(self._kept) > 1:
-            _, dropped = self._kept.popitem(last=False)
-            self._kept_bytes -= len(dropped.data)
 
 
 def _retrieve(task: "asyncio.Task[Frame]") -> None:

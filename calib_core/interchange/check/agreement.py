@@ -162,7 +162,11 @@ def compare(
         same_person: the same person clicked the same reflector in both.
     """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
-    known = _known_covariances(a, b)
+    known = [
+        side.file.calibration.covariance
+        for side in (a, b)
+        if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
+    ]
     covariance = np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
     difference = pose_difference(a_pose, b_pose, covariance)
     change, shared, unshared = _change(a, b, covariance, same_sensors=same_sensors, same_person=same_person)
@@ -220,14 +224,6 @@ def _other_intrinsics(a: CalibrationFile, b: CalibrationFile) -> bool:
     """Return whether two calibrations were solved with different intrinsics, or with others to refine."""
     one, other = (file.calibration.given_camera or file.calibration.camera for file in (a, b))
     return camera_document(one) != camera_document(other)
-
-
-def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[Matrix66]:
-    return [
-        side.file.calibration.covariance
-        for side in (a, b)
-        if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
-    ]
 
 
 WITHOUT_COVARIANCE = {"deg": 1.0, "cm": 5.0, "px": 10.0}

@@ -215,7 +215,17 @@ def check(
     results += answering("own-pairs", by_own_pairs(imported))
     no_proof = _no_proof(imported, against=against, of=of)
     results += answering("solved", _by_own_verdict(imported))
-    results += _assumed_references(against=against, of=of)
+    results += [
+        CheckResult(
+            "warning",
+            _ASSUMED_REFERENCE,
+            f"what the file given with --{option} means was assumed when it was imported: being like it proves nothing",
+            "prove that one first: cocalib import FILE --pairs PAIRS",
+            option,
+        )
+        for option, other in (("against", against), ("of", of))
+        if _is_assumed(other)
+    ]
     untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, _CONTRADICTORY, _RADAR_MISSING, *no_proof}
     tested = [result for result in results if result.code not in untested]
     if not tested or (against is None and not any(result.level == "error" for result in tested)):
@@ -258,20 +268,6 @@ def _by_own_verdict(imported: ImportedCalibration) -> list[CheckResult]:
         return [CheckResult("warning", _CONTRADICTORY, message, file.verdict.action)]
     missing = [warning_remark(one) for one in file.calibration.warnings if one.code == _RADAR_MISSING]
     return [CheckResult("warning", _RADAR_MISSING, str(one.message), str(one.hint)) for one in missing]
-
-
-def _assumed_references(**others: ImportedCalibration | None) -> list[CheckResult]:
-    return [
-        CheckResult(
-            "warning",
-            _ASSUMED_REFERENCE,
-            f"what the file given with --{option} means was assumed when it was imported: being like it proves nothing",
-            "prove that one first: cocalib import FILE --pairs PAIRS",
-            option,
-        )
-        for option, other in others.items()
-        if _is_assumed(other)
-    ]
 
 
 def _is_assumed(other: ImportedCalibration | None) -> bool:

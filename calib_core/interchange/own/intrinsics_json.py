@@ -56,7 +56,17 @@ def write_intrinsics(
         rms_px=finite_or_none(lens.rms_px),
         held_out_rms_px=finite_or_none(lens.held_out_rms_px),
         choice=lens.choice,
-        models=_models(lens),
+        models=[
+            ModelTrialDocument(
+                trial.model,
+                finite_or_none(trial.rms_px),
+                finite_or_none(trial.held_out_rms_px),
+                finite_or_none(trial.worse_by),
+                finite_or_none(trial.standard_error),
+                trial.fault,
+            )
+            for trial in lens.trials
+        ],
         searched=searched,
         views=[_view(view) for view in lens.views],
         left_out=[structs.replace(image, name=image.name[:_LONGEST_NAME]) for image in lens.left_out],
@@ -75,20 +85,6 @@ def _parameters(camera: Camera) -> list[LensParameterDocument]:
     return [
         LensParameterDocument(name, value, None if known is None else known.sigma(name))
         for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True)
-    ]
-
-
-def _models(lens: CalibratedLens) -> list[ModelTrialDocument]:
-    return [
-        ModelTrialDocument(
-            trial.model,
-            finite_or_none(trial.rms_px),
-            finite_or_none(trial.held_out_rms_px),
-            finite_or_none(trial.worse_by),
-            finite_or_none(trial.standard_error),
-            trial.fault,
-        )
-        for trial in lens.trials
     ]
 
 

@@ -14,8 +14,6 @@ from calib_core.words.outcomes import WarningText
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
 
 _Side = Annotated[int, Meta(ge=1, le=1_000_000)]
-_Number = Annotated[int, Meta(ge=0, le=1_000_000_000)]
-_Text = Annotated[str, Meta(max_length=10_000)]
 
 
 class ImageSource(Struct, frozen=True, forbid_unknown_fields=True):

@@ -329,7 +329,10 @@ def _shifted(scans: RadarScans, spread: Spread) -> RadarScans:
 def _are_ranges(examined: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
     """Return whether two topics are near and far scans of one radar: they agree where both see, or are named so."""
     named = _words(examined.name, _RANGE_WORDS) != _words(other.name, _RANGE_WORDS)
-    complementary = _reach_differs(examined.figures, other.figures)
+    far = sorted((examined.figures.farthest_m, other.figures.farthest_m))
+    near = sorted((examined.figures.nearest_m, other.figures.nearest_m))
+    # one reaches much farther than the other, or begins where the other ends
+    complementary = far[1] > _FARTHER * far[0] or (near[1] > _FARTHER * near[0] and far[0] < far[1])
     if not (named or complementary):
         return False
     common = [_in_common(scans, examined.figures, other.figures) for scans in (first, second)]
@@ -351,13 +354,6 @@ def _agreement(scans: RadarScans, other: RadarScans, spread: Spread, *, azimuth:
     """Return the share of the returns that two topics report alike, beyond chance."""
     by_chance = len(matches(scans, _shifted(other, spread), spread, azimuth=azimuth)[0])
     return (len(matches(scans, other, spread, azimuth=azimuth)[0]) - by_chance) / min(_count(scans), _count(other))
-
-
-def _reach_differs(figures: Figures, other: Figures) -> bool:
-    """Return whether one radar reaches much farther than the other, or begins where the other ends."""
-    far = sorted((figures.farthest_m, other.farthest_m))
-    near = sorted((figures.nearest_m, other.nearest_m))
-    return far[1] > _FARTHER * far[0] or (near[1] > _FARTHER * near[0] and far[0] < far[1])
 
 
 def _in_common(scans: RadarScans, figures: Figures, other: Figures) -> RadarScans:

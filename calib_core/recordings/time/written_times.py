@@ -87,16 +87,11 @@ def moments_in(text: str) -> Iterator[WrittenMoment]:
             second = (moment - _EPOCH) // timedelta(seconds=1) - (zone_of(zone) if zone else 0)
         except ValueError:
             continue
-        digits = _in_nanoseconds(part["digits"], part["unit"])
+        wanted = {"ms": 3, "us": 6, "ns": 9}.get(part["unit"] or "", 0)
+        digits = (part["digits"] or "").rjust(wanted, "0")  # 5ms is 005
         yield WrittenMoment(
             second, part["fraction"] or digits, bool(part["point"] or part["unit"] or not digits), bool(zone), match.span()
         )  # fmt: skip
-
-
-def _in_nanoseconds(digits: str | None, unit: str | None) -> str:
-    """Return the digits of a fraction; with a unit, padded to it: 5ms is 005."""
-    wanted = {"ms": 3, "us": 6, "ns": 9}.get(unit or "", 0)
-    return (digits or "").rjust(wanted, "0")
 
 
 def date_text(text: str) -> WrittenMoment | None:

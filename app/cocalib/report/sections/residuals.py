@@ -111,20 +111,15 @@ def _scatter_plot(
     if not shown.any():
         empty = drawing(f"{heading}: nothing to draw.", text(_WIDTH / 2, 88, "nothing to draw", class_="middle"))
         return captioned(heading, empty)
-    low, high = _ends(values[shown])
+    low, high = float(values[shown].min()), float(values[shown].max())
+    room = 0.04 * (high - low) or 1.0
+    low, high = low - room, high + room
     axes = Axes(*((high, low) if mirrored else (low, high)), 0.0, 1.05 * max(float(rows.lengths_px[shown].max()), 1e-3))
     marks = [
         mark(rows.kinds[index], axes.x(values[index]), axes.y(rows.lengths_px[index]))
         for index in np.flatnonzero(shown)[::every].tolist()
     ]
     return captioned(heading, drawing(f"{heading}.", axes.drawn(label, "length [px]"), *marks))
-
-
-def _ends(values: Values) -> tuple[float, float]:
-    """Return the ends of an axis: a little beyond the values."""
-    low, high = float(values.min()), float(values.max())
-    room = 0.04 * (high - low) or 1.0
-    return low - room, high + room
 
 
 def _lengths(rows: ResidualRows) -> Markup:

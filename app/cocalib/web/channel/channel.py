@@ -244,9 +244,6 @@ class Channel:
             return
         header = replace(frame.header, request=wanted.request)
         self.outbox.put(encode_frame(header, frame.data), kind="frame")
-        self._prefetch(wanted)
-
-    def _prefetch(self, wanted: FrameWanted) -> None:
         if wanted.index != self._cursor.index:
             self._forward = wanted.index > self._cursor.index
         self._hub.frames.prefetch(wanted.index, wanted.size, 1 if self._forward or wanted.playing else -1)

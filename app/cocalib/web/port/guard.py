@@ -223,9 +223,11 @@ class Guard:
         hosts = request.headers.get("host", ())
         if len(hosts) != 1:
             return Refused(400, "A request needs exactly one Host header.")
-        name = _host_name(hosts[0].strip().lower())
+        host = hosts[0].strip().lower()
+        match = _HOST.fullmatch(host)
+        name = match[1] if match else host
         if name in self._names or (self._takes_addresses and is_address(name)):
-            return hosts[0].strip().lower()
+            return host
         return Refused(421, "This server does not accept that host name. Use the link shown in the terminal.")
 
     def _foreign_origin(self, request: Request, host: str) -> Refused | None:
@@ -250,12 +252,6 @@ class Guard:
 
 def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
-
-
-def _host_name(host: str) -> str:
-    """Return a Host header without its port; the whole of one that has more than a name and a port."""
-    match = _HOST.fullmatch(host)
-    return match[1] if match else host
 
 
 def is_address(name: str) -> bool:

@@ -8,7 +8,7 @@ import posixpath
 import re
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
@@ -462,10 +462,5 @@ def _collect(name: str, folder: Path, names: dict[str, None]) -> None:
     if name in names:
         return
     names[name] = None
-    for imported in _imports(folder / name):
+    for imported in _IMPORT.findall((folder / name).read_text(encoding="utf-8")):
         _collect(posixpath.normpath(posixpath.join(posixpath.dirname(name), imported)), folder, names)
-
-
-def _imports(module: Path) -> Iterator[str]:
-    """Yield the paths that a module names, as it writes them."""
-    yield from _IMPORT.findall(module.read_text(encoding="utf-8"))

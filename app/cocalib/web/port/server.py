@@ -220,7 +220,8 @@ class RunningServer:
 
     async def _view_opened(self, client: "viser.ClientHandle") -> None:
         """Connect a new 3D view to the page that contains it."""
-        tab = _tab_of(self._viser, client.client_id)
+        address = path_of_client(self._viser, client.client_id)
+        tab = address.partition("?")[0].rstrip("/").rpartition("/")[2]
         scene = TabScene(client)
         self._scenes[tab] = (client.client_id, scene)
         channel = self._channels.get(tab)
@@ -255,8 +256,3 @@ def _asked(request: Request, method: str = "GET") -> guard.Request:
 def _response(reply: Reply) -> Response:
     headers = Headers([*reply.headers, ("Content-Length", str(reply.length)), ("Connection", "close")])
     return Response(reply.status.value, reply.status.phrase, headers, reply.body)
-
-
-def _tab_of(server: "viser.ViserServer", client_id: int) -> str:
-    """Return the name of the tab that a 3D view belongs to: the last part of its address."""
-    return path_of_client(server, client_id).partition("?")[0].rstrip("/").rpartition("/")[2]

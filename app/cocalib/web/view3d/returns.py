@@ -112,7 +112,8 @@ class Colouring:
         if scale is None:
             return SpaceLegend("", "static", "moving", (_css(palette.still), _css(palette.moving)), ramp=False)
         ramp = RETURN_RAMPS["signed" if self.colour == "doppler" else "rising", self.light]
-        low, high = (f"{end:+.0f}" if self.colour == "doppler" else f"{end:.{_decimals(scale)}f}" for end in scale)
+        decimals = 0 if scale[1] - scale[0] >= 10 else 1
+        low, high = (f"{end:+.0f}" if self.colour == "doppler" else f"{end:.{decimals}f}" for end in scale)
         unit = {"range": "m", "doppler": "m/s", "amplitude": "dB", "height": "m"}[self.colour]
         title = {"range": "Range", "doppler": "Doppler", "amplitude": "SNR", "height": "Height"}[self.colour]
         return SpaceLegend(title, low, f"{high} {unit}", tuple(map(_css, ramp)), ramp=True)
@@ -144,7 +145,3 @@ def _mixed(colours: np.ndarray, weight: Values, *, light: bool) -> np.ndarray:
 
 def _css(colour: tuple[int, int, int]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*colour)
-
-
-def _decimals(scale: tuple[float, float]) -> int:
-    return 0 if scale[1] - scale[0] >= 10 else 1

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
-from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
 from cocalib.view.model import PlacementState
@@ -191,7 +191,9 @@ class TabScene:
         calibration = sight.calibration
         camera = calibration.camera if calibration else sight.camera
         self._camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
-        _place(self._frustum, self._camera_from_radar.inverse())
+        radar_from_camera = self._camera_from_radar.inverse()
+        self._frustum.wxyz = quaternion_wxyz_from_matrix(radar_from_camera.rotation)
+        self._frustum.position = radar_from_camera.translation_m
         self._frustum.color = self._palette.solved if isinstance(outcome, Calibration) else _DIM
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
@@ -278,11 +280,6 @@ def _is_hidden(points_m: Points3, viewer_m: Vector3, size_m: Vector3) -> bool:
 
 def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
     return ellipsoids(true_positions(calibration, pairs), calibration.options.noise, calibration.noise_scale)
-
-
-def _place(node: Any, target_from_node: RigidTransform) -> None:
-    node.wxyz = quaternion_wxyz_from_matrix(target_from_node.rotation)
-    node.position = target_from_node.translation_m
 
 
 _RING_SHARE = 0.025

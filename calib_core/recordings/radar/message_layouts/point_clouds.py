@@ -103,7 +103,8 @@ class CloudLayout:
             return _with_lost(returns, beyond)
         if height == 1 and order == "<":
             start = _after_header(payload, self.definition) + 8
-            self._remember(payload[start : len(payload) - len(data) - 9], _Shape(dtype, plan))
+            if len(self._known) < 16:
+                self._known[payload[start : len(payload) - len(data) - 9]] = _Shape(dtype, plan)
         return returns
 
     def returns_of_rows(self, rows: np.ndarray, lengths: np.ndarray) -> tuple[Returns, np.ndarray] | None:
@@ -134,10 +135,6 @@ class CloudLayout:
                 after = np.minimum(end + 8 + sizes, rows.shape[1] - 1)
                 return _unless_marked(returns, rows[np.arange(len(rows)), after] != 0, width), width
         return None
-
-    def _remember(self, block: bytes, shape: _Shape) -> None:
-        if len(self._known) < 16:
-            self._known[block] = shape
 
 
 def lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
