@@ -331,14 +331,18 @@ class SqliteSource:
         log = Path(f"{file.stored}-wal")
         self._kept = None if log.exists() and log.stat().st_size else cache_of(file)
         try:
-            self._connection = connect(self._file, self._until_closed)
-            self._until_closed.callback(self._connection.close)
+            self._connect()
             self.channels: tuple[Channel, ...] = self._read_channels()
             if not self.channels:
                 self.index(0)  # warns about messages of unknown topics
         except RecordingError:
             self._until_closed.close()
             raise
+
+    def _connect(self) -> None:
+        """Open the database, until the file is closed."""
+        self._connection = connect(self._file, self._until_closed)
+        self._until_closed.callback(self._connection.close)
 
     @contextmanager
     def _database(self) -> Iterator[sqlite3.Connection]:
