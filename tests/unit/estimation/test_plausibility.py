@@ -244,5 +244,9 @@ def test_clicks_in_one_row_are_told(simulated):
     told = calibrate_pairs(pairs_from_arrays(points, guessed), simulated.camera).unwrap()
     assert verdict_on(told).level in ("coarse", "contradictory")
     assert "one-row" not in found_in(simulated, points, pixels)
-    equally_far = points / np.linalg.norm(points, axis=1, keepdims=True) * 8.0
-    assert "one-row" not in found_in(simulated, equally_far, guessed)
+    rows_px = guessed[:, 1] - guessed[:, 1].mean()
+    wider_px = 0.0075 * simulated.camera.height_px / rows_px.std() * rows_px
+    assert "one-row" not in found_in(simulated, points, np.column_stack([pixels[:, 0], 540.0 + wider_px]))
+    directions = points / np.linalg.norm(points, axis=1, keepdims=True)
+    assert "one-row" not in found_in(simulated, 8.0 * directions, guessed)
+    assert "one-row" in found_in(simulated, np.linspace(5.0, 10.0, len(points))[:, None] * directions, guessed)
