@@ -74,7 +74,10 @@ def drive(
     folder = results.path.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     calls = [(job, folder) for job in left]
-    died = lambda number: failed_outcome(left[number], folder, reason=_DIED, hint=_DIED_HINT)  # noqa: E731
+
+    def died(number: int) -> Outcome:
+        return failed_outcome(left[number], folder, reason=_DIED, hint=_DIED_HINT)
+
     try:
         with closing(engine.run_all(run_once, calls, died)) as outcomes:
             for finished, (_, outcome) in enumerate(outcomes, start=1):
