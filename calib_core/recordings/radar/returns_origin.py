@@ -244,13 +244,13 @@ def _resolution_m(points: Points3) -> float:
 
 
 def _bins(points: Points3, step_m: float) -> float:
-    """Return what bins of range, and of azimuth or its sine, explain [nats]; 0 if those of x and y explain more."""
+    """Return what bins of range, and of azimuth or its sine, explain beyond those of x and y [nats]; 0 if they explain less."""
     _, first = np.unique(np.round(points / step_m), axis=0, return_index=True)  # repeated ones repeat about any place
     x, y = points[first, :2].T
     range_m, u, _ = direction_cosines(points[first]).T
     angles = np.median(range_m) * np.array([np.arctan2(y, x), u])
     polar = _repeats(range_m, step_m) + max(_repeats(values, step_m) for values in angles)
-    return polar if polar > _repeats(x, step_m) + _repeats(y, step_m) else 0.0
+    return max(polar - _repeats(x, step_m) - _repeats(y, step_m), 0.0)
 
 
 def _measured_at(points: Points3, step_m: float) -> tuple[Vector3, float]:

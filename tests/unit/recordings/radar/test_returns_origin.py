@@ -103,11 +103,11 @@ def test_returns_without_bins_are_never_taken_for_the_other_ones(numbers):
         assert origin_of(scans, "base_link", mount).by_data == "sensor"
 
 
-@pytest.mark.parametrize("step_m", [0.2, 0.001])
-def test_rounded_coordinates_are_no_bins_of_a_radar(step_m):
-    scans = smooth(scans_of("imaging"), np.random.default_rng(1))
+@pytest.mark.parametrize(("step_m", "seed", "every"), [(0.2, 1, 1), (0.001, 1, 1), (0.001, 3, 1), (0.001, 3, 4)])
+def test_rounded_coordinates_are_no_bins_of_a_radar(step_m, seed, every):
+    scans = smooth(scans_of("imaging"), np.random.default_rng(seed))
     rounded = replace(scans, points_radar_m=np.round(scans.points_radar_m / step_m) * step_m)
-    in_front = rounded.take(np.flatnonzero(rounded.points_radar_m[:, 0] > FRONT[0] + 0.1))
+    in_front = rounded.take(np.flatnonzero(rounded.points_radar_m[:, 0] > FRONT[0] + 0.1)[::every])
     for numbers in (FRONT, (3.6, 0.8, 0.0, 0.0, 0.0, 0.0)):
         assert origin_of(in_front, "radar_front", mount_of(numbers)).by_data == "unknown"
 
