@@ -106,6 +106,13 @@ def test_what_repeats_itself_at_one_place_counts_less():
     assert min(repeated) > 5.0 * float(np.median(moved))
 
 
+def test_one_dwell_in_ten_is_no_reflector_however_plain_its_only_place_is():
+    drawn = draw_views(5, Drawing(count=4, decoys=0, clutter=0, listed_share=1.0))
+    plain = [replace(view, candidates=(replace(view.candidates[0], has_apex=True),)) for view in drawn.views]
+    missing = candidate_rays(plain, drawn.camera, OPTIONS).missing
+    assert 0.07 < missing.min() <= missing.max() < 0.15
+
+
 def two_at_once() -> tuple[DrawnViews, list[DwellView]]:
     """All dwells of an even number last until the next one ends, and both reflectors are seen in each."""
     drawn = draw_views(6, Drawing(count=8, decoys=1, clutter=0, listed_share=1.0))
