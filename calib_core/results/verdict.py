@@ -149,14 +149,12 @@ class Assumed:
 
     Attributes:
         measured: the camera position was measured, and is right; otherwise, that the phase center was clicked.
-        alone_cm: how well the pairs alone place the camera; NaN if unknown, or not measured.
         not_mirrored: no radar axis is mirrored.
         elevations: the radar's elevations are right.
         principal_point_px: how far the principal point may be off, which the rotation absorbs; NaN if its calibration says so.
     """
 
     measured: bool
-    alone_cm: float
     not_mirrored: bool
     elevations: bool
     principal_point_px: float
@@ -235,38 +233,14 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
 
 
 def _assumptions_of(calibration: Calibration) -> Assumed:
-    measured = calibration.options.solving.camera_position is not None
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
     known = given.covariance is not None or not sigma_px
     return Assumed(
-        measured=measured,
-        alone_cm=_alone_cm(calibration) if measured else float("nan"),
+        measured=calibration.options.solving.camera_position is not None,
         not_mirrored=any(warning.code == _NOT_MIRRORED for warning in calibration.warnings),
         elevations=calibration.sees_elevation,
         principal_point_px=float("nan") if known else 2.0 * scaled_px(sigma_px, given),
     )
-
-
-def _alone_cm(calibration: Calibration) -> float:
-    """Return how well the camera's place would be known without its measurement [cm]; NaN if that is not known.
-
-    With P the covariance of the place and M what of it the measurement leaves, P^-1 (P - M) P^-1 is the information of the pairs.
-    """
-    if calibration.covariance_parts is None or not calibration.sees_elevation:
-        return float("nan")
-    to_centre = camera_position_jacobian(calibration.camera_from_radar)
-    with np.errstate(all="ignore"):  # a file may state any number
-        whole = to_centre @ calibration.covariance @ to_centre.T
-        measured = to_centre @ calibration.covariance_parts.camera_position @ to_centre.T
-        inverse = np.linalg.pinv(whole) if np.isfinite(whole).all() else whole
-        information = inverse @ (whole - measured) @ inverse
-    if not np.isfinite(information).all():
-        return float("nan")
-    values, axes = np.linalg.eigh(information)
-    if not values[0] > 0.0:
-        return float("nan")
-    alone = (axes / values) @ axes.T
-    return _rounded_up(CM_PER_M * _radius(alone, degrees_of_freedom(calibration.covariance_quantile)))
 
 
 def _states_error(calibration: Calibration) -> bool:

@@ -245,11 +245,7 @@ def assumed_words(assumed: Assumed | None) -> Words:
     """Return what no pair can show, as a phrase; nothing if nothing is assumed."""
     if assumed is None:
         return Words()
-    if assumed.measured:
-        alone = f" (the pairs alone: within {assumed.alone_cm:g} cm)" if np.isfinite(assumed.alone_cm) else ""
-        first = f"a correct camera position{alone}"
-    else:
-        first = "clicks on the phase center"
+    first = "a correct camera position" if assumed.measured else "clicks on the phase center"
     principal_point = f"the principal point within {assumed.principal_point_px:.2g} px"
     parts = (
         first,

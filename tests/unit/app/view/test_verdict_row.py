@@ -18,7 +18,7 @@ from cocalib.view.click_rows import disagreement
 from tests.unit.app.view.test_view import ASKING, FIVE, calibration, pair, shown
 
 ERROR = StatedError(rotation_deg=0.3, position_cm=3.0, image_px=4.0, range_m=9.0, in_plane=False)
-ASSUMED = Assumed(measured=False, alone_cm=np.nan, not_mirrored=True, elevations=True, principal_point_px=5.0)
+ASSUMED = Assumed(measured=False, not_mirrored=True, elevations=True, principal_point_px=5.0)
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
 
 
