@@ -53,7 +53,7 @@ from calib_core.measurements import MIN_PAIRS
 _MOST_ROUNDS = 80  # number of steps, a choice: a fit that has not settled by then ends there
 _ROUNDS_BEFORE_SCALES = 3  # steps, a choice: residuals at a pose that still moves would pass for noise
 _ROUNDS_PER_WEIGHING = 3  # steps from one weighing to the next, a choice: weights settle long before noise scales do
-_TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
+_TOLERANCES = (1e-6, 1e-5)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
 _COARSE_TOLERANCES = (0.02, 0.02)  # of the same units, a choice: previews and the gain of mirrored axes need no more
 _LARGEST_RATIO = 0.95  # of successive changes of the noise scales; above it nothing is extrapolated
 _UNDONE, _SMALL_STEP, _MAX_DAMPING = 0.3, 1e-6, 1e4  # share of a step, squared standard deviations of the priors
