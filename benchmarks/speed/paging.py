@@ -49,6 +49,8 @@ _ROUNDS = 4
 _CLICKS = 20
 _STEPS = 40
 _MARKS_EACH = 10
+_AT_REST_MS = 5_000
+"""How long the page rests before Check is opened: without a graphics card a drawing of the 3D view takes up to a second."""
 _PLAY_S = 20.0
 _SAMPLE = [str(sample_folder() / "rooftop" / name) for name in ("radar.bag", "camera.bag")]
 _MEASURES = Path(__file__).with_name("measures.js")
@@ -108,13 +110,14 @@ def measure_sheet(scratch: Path) -> Table:
                 if number == 0:  # here the cut-outs are made
                     opened.page.wait_for_timeout(10_000)
                     continue
+                opened.page.wait_for_timeout(_AT_REST_MS)
                 for what, value_ms in opened.page.evaluate("() => window.__measures.sheet()").items():
                     measured.setdefault(what, []).append(value_ms)
     return Table(
         "The contact sheet",
-        f"{len(marks)} marks of the sample and their cut-outs of the session before, with the 3D view next to the image; the "
-        f"page Check is opened once in each of {_ROUNDS - 1} sessions of this version and of {_EARLIER_SHEET}, in turn. Alone: "
-        "`python -m benchmarks.speed.paging --sheet`.",
+        f"{len(marks)} marks of the sample and their cut-outs of the session before, with the 3D view next to the image, drawn "
+        f"and at rest; the page Check is opened once in each of {_ROUNDS - 1} sessions of this version and of "
+        f"{_EARLIER_SHEET}, in turn. Alone: `python -m benchmarks.speed.paging --sheet`.",
         (
             _against("opening Check to its grid with numbers", *(times["grid"] for times in times_ms.values())),
             _against("opening Check to the cut-outs in sight", *(times["cutOuts"] for times in times_ms.values())),

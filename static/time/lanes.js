@@ -252,6 +252,9 @@ function drawCursor(pen, height, x) {
   pen.fill();
 }
 
+/** Height of the overview below the lanes [CSS px]. */
+export const OVERVIEW = 6;
+
 /** While a part is shown: all placements below it, with the part in a frame. @param {Context2D} pen @param {number} width @param {number} height @param {Axis} axis */
 function drawOverview(pen, width, height, { from_s, to_s, folding }) {
   const [room, last] = [width - lanes.left - lanes.right, toFolded(folding, state.seconds[state.seconds.length - 1])];
@@ -259,7 +262,7 @@ function drawOverview(pen, width, height, { from_s, to_s, folding }) {
   const [left, wide] = [at(from_s), at(to_s) - at(from_s)];
   if (wide > 0.99 * room) return;
   pen.fillStyle = themeColour("surface");
-  pen.fillRect(lanes.left - 8, height - 6, width, 6);
+  pen.fillRect(lanes.left - 8, height - OVERVIEW, width, OVERVIEW);
   pen.fillStyle = themeColour("accent");
   for (const { start_s, end_s } of state.placements) pen.fillRect(at(start_s), height - 4, Math.max(1, at(end_s) - at(start_s) - 1), 2);
   pen.lineWidth = 1;

@@ -2,7 +2,7 @@
 
 import { hideTip, showTip } from "../base/notices.js";
 import { clicks, nameOf, on, onPainted, residualText, state, stateOf, timeText } from "../base/state.js";
-import { changes, drawLanes, laneBoxes, lanes } from "./lanes.js";
+import { changes, drawLanes, laneBoxes, lanes, OVERVIEW } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
 
@@ -23,6 +23,8 @@ const fingers = new Map();
 let pointer = null;
 let waiting = false;
 let dragging = false;
+/** Whether what is dragged is the overview. */
+let overview = false;
 /** Width of the canvas; asking it for its own would lay the page out for each bar [CSS px]. */
 let wide = 1;
 
@@ -53,6 +55,7 @@ function pressed(event) {
   canvas.setPointerCapture(event.pointerId);
   if (event.pointerType === "touch") fingers.set(event.pointerId, event.offsetX);
   dragging = fingers.size < 2;
+  overview = onOverview(event);
   if (dragging) scrub(event);
 }
 
@@ -114,9 +117,17 @@ export const toSeconds = (x) => unfolded(folding, toDrawn(x));
 function scrub(event) {
   if (!state.seconds.length) return;
   hideTip();
+  if (overview) {
+    const there = Math.min(1, Math.max(0, (event.offsetX - lanes.left) / room())) * length();
+    zoomTo(span.to - span.from, there, lanes.left + room() / 2);
+    return jump(nearestIndex(unfolded(folding, there)));
+  }
   const reach = event.pointerType === "touch" ? FINGER_REACH : REACH;
   jump(stemNear(event.offsetX, reach)?.frame ?? nearestIndex(toSeconds(event.offsetX)));
 }
+
+/** Whether a pointer is on the strip that shows everything while a part is shown. @param {PointerEvent} event */
+const onOverview = (event) => span.to - span.from < 0.99 * length() && event.offsetY >= canvas.clientHeight - OVERVIEW;
 
 /** @param {number} x @param {number} reach CSS px */
 function stemNear(x, reach) {
@@ -126,6 +137,7 @@ function stemNear(x, reach) {
 
 /** @param {PointerEvent} event */
 function explain(event) {
+  if (onOverview(event)) return showTip("All placements; press to go there", event.clientX, event.clientY - 10);
   const seconds = toSeconds(event.offsetX);
   const gap = gapsOf(folding).find(({ from, to }) => from < seconds && seconds < to);
   const lines = gap ? [`No frames for ${lengthWords(gap.to - gap.from)}, from ${timeText(gap.from, 1)} to ${timeText(gap.to, 1)}`] : aboutTime(seconds, event);

@@ -129,6 +129,11 @@ def test_zoomed_in_a_strip_shows_all_placements_below_the_part_in_sight(page: Dr
     page.page.mouse.wheel(0, -900)
     page.drawn()
     assert placements_in_strip(page) == len(page.value("__cocalib.state.placements"))
+    for share in (0.9, 0.2):
+        page.page.mouse.click(box["x"] + 76 + share * (box["width"] - 76), box["y"] + box["height"] - 2)
+        page.until(f"Math.abs(__cocalib.state.cursor / __cocalib.state.seconds.length - {share}) < 0.03")
+        page.drawn()
+        assert placements_in_strip(page) == len(page.value("__cocalib.state.placements")), "a part is still shown"
 
 
 def placements_in_strip(page: Driver) -> int:
