@@ -28,7 +28,7 @@ from calib_core.synthetic.rendering.reflector import Facet
 from calib_core.synthetic.scene.person import Capsule
 from cocalib.proposing import find_proposals
 
-__all__ = ["main"]
+__all__ = ["DECOYS", "main"]
 
 _PLACEMENTS = 8
 _BROWN = np.array([0.15, 0.25, 0.4], dtype=np.float32)
@@ -73,13 +73,13 @@ def _of_another(seed: int) -> Drawn:
     return replace(own, placements=moved)
 
 
-_KINDS: dict[str, Callable[[int], Drawn]] = {
+DECOYS: dict[str, Callable[[int], Drawn]] = {
     "a person with a box": partial(_with_nothing, renderer=_Box),
     "a person with nothing": _with_nothing,
     "people who walk and stop": _walkers,
     "images of another recording": _of_another,
-    "a reflector": draw_small,
 }
+_KINDS = DECOYS | {"a reflector": draw_small}
 
 
 def main() -> None:

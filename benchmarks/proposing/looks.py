@@ -19,7 +19,7 @@ from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import Facet, subdivided
 from calib_core.synthetic.scene.person import Capsule
 
-__all__ = ["LOOKS", "Look", "draw_with_look", "sheet"]
+__all__ = ["LOOKS", "Look", "draw_with_look", "every_dwell", "sheet"]
 
 _WHITE, _BLACK, _STEEL = (np.full(3, level, dtype=np.float32) for level in (0.9, 0.02, 0.5))
 _BINS = (0.5, 0.7, 0.8, 0.9)
@@ -102,7 +102,7 @@ def main() -> None:
             except OptionError:
                 continue
             views = dwell_views(drawn.placements, drawn.frames, drawn.recording.camera)
-            clicked = after_one_click(_all(views), views, drawn)
+            clicked = after_one_click(every_dwell(views), views, drawn)
             if clicked is None:
                 continue
             of += len({true.id for view in views if (true := true_placement(view.placement, drawn.recording))}) - 1
@@ -116,7 +116,7 @@ def main() -> None:
         print(f"confidence from {low}: {sum(good)} of {len(good)} on the reflector")
 
 
-def _all(views: Sequence[DwellView]) -> Proposals:
+def every_dwell(views: Sequence[DwellView]) -> Proposals:
     """Return all dwells as proposals: the person clicks the first at which a reflector stands."""
     unseen = np.full(2, np.nan)
     return Proposals(tuple(Proposal(view.placement, view.image_time, unseen, 1.0, 1.0, ()) for view in views))

@@ -118,6 +118,8 @@ _SCENES: dict[str, tuple[tuple[float, float], ...]] = {
     "25_left1_right1": ((212.4, 202.4), (464.6, 207.7)),
 }
 """Both boards of each scene, clicked by us in the frame in its middle."""
+BOARD_RANGES_M = (10.0, 10.0, 15.0, 10.0, 15.0, 15.0, 20.0, 20.0, 25.0, 25.0)
+"""Of the same boards, as the scenes' names state them."""
 _MESSAGE = "std_msgs/Header header\nfloat32[] range\nfloat32[] azimuth1\nfloat32[] azimuth2\nfloat32[] vrelrad\nfloat32[] snr\n"
 
 

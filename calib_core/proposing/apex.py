@@ -171,7 +171,8 @@ def find_apex(
     inside = [one for one in found if float(np.hypot(*(one.pixel_px - near_px))) <= reach_px]
     inside.sort(key=lambda one: -one.fit.contrast)
     if not inside:
-        return NoApex(_what_was_seen(proposals, reach_px))
+        seen = "no three sheets that meet in one point" if proposals else "nothing with three sheets"
+        return NoApex(f"{seen} within {reach_px:.0f} px")
     best, *others = inside
     apart_px = max(
         (float(np.hypot(*(rival.pixel_px - best.pixel_px))) for rival in _rival_corners(best, others)), default=0.0
@@ -249,14 +250,14 @@ def _grown(levels: dict[int, _Reduced], proposal: _Proposal) -> _Found | None:
     found = _checked(levels, proposal, at)
     size_px = proposal.factor * proposal.radius_px
     for factor, radius_px in _GROWING:
-        if at is None or not may_be_corner(at.fit):
+        if at is None or not _is_within(at.fit, _LOOSE):
             break
         if factor * radius_px <= size_px:
             continue
         larger = _fitted(levels, factor, at.pixel_px, at.fit.starts_rad, radius_px, at)
         if larger is None or larger.fit.residual_grey > _WORSE * at.fit.residual_grey + 0.3:
             break
-        if not has_angles_of_corner(larger.fit):
+        if not _angles_within(larger.fit, _strict_at(larger.fit.radius_px)):
             return None  # it fits as well, and knows the angles better
         if larger.moved_px > max(0.5, 4.0 * _sigma_px(at)):
             break
@@ -310,12 +311,6 @@ def _covariance(found: _Found) -> Matrix22:
     if fit.radius_px < _FEW_PIXELS_PX:
         added_px2 += _FEW_PIXELS_PX2
     return np.asarray(_FITTED * factor**2 * fit.covariance_px2 + added_px2 * np.eye(2))
-
-
-def _what_was_seen(proposals: list[_Proposal], reach_px: float) -> str:
-    if not proposals:
-        return f"nothing with three sheets within {reach_px:.0f} px"
-    return f"no three sheets that meet in one point within {reach_px:.0f} px"
 
 
 _SLOPES_FROM_PX = 5.0
@@ -522,14 +517,8 @@ _HALF_TURN = (-0.90, -0.15)
 """Correlation of a disc with itself turned by 180 deg: -1 for a straight edge, 1 for a line or the X of a checkerboard."""
 
 
-def may_be_corner(fit: SectorFit) -> bool:
-    """Return whether a larger disc is worth a try."""
-    return _is_within(fit, _LOOSE)
-
-
-def has_angles_of_corner(fit: SectorFit) -> bool:
-    """Return whether the angles of the three sectors are those of three sheets seen from inside."""
-    return _angles_within(fit, next(one for one in _STRICT if fit.radius_px >= one.from_px))
+def _strict_at(radius_px: float) -> _Limits:
+    return next(one for one in _STRICT if radius_px >= one.from_px)
 
 
 def is_corner(fit: SectorFit, score: float, half_turn: float) -> bool:
@@ -540,7 +529,7 @@ def is_corner(fit: SectorFit, score: float, half_turn: float) -> bool:
         score: of the proposal that it began with.
         half_turn: the correlation of its disc with itself turned by 180 deg.
     """
-    limits = next(one for one in _STRICT if fit.radius_px >= one.from_px)
+    limits = _strict_at(fit.radius_px)
     steady = fit.slope_grey <= _STEEPEST * fit.step_grey
     return steady and score >= limits.score and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1] and _is_within(fit, limits)
 
@@ -568,13 +557,10 @@ def half_turn_correlation(grey: np.ndarray, fit: SectorFit) -> float:
         grey: (h, w) the image of the fit.
         fit: the fit.
     """
-    half = int(np.ceil(fit.radius_px))
-    column, row = (round(float(v)) for v in fit.apex_px)
-    if not (half <= column < grey.shape[1] - half and half <= row < grey.shape[0] - half):
+    disc = _disc(grey, fit.apex_px, fit.radius_px)
+    if disc is None:
         return 1.0
-    x, y = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
-    levels = grey[row - half : row + half + 1, column - half : column + half + 1][x * x + y * y <= fit.radius_px**2]
-    levels = levels - levels.mean()
+    levels = disc.grey - disc.grey.mean()
     return float(levels @ levels[::-1]) / max(float(levels @ levels), 1e-9)
 
 
@@ -653,17 +639,13 @@ def score_sectors(grey: np.ndarray, radius_px: float) -> tuple[np.ndarray, np.nd
 
 def _weakest_boundary(sums: np.ndarray, squares: np.ndarray, areas: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return for each division (rows) and pixel (columns) the variance that its weakest boundary explains over the rest."""
-    before = np.concatenate([np.zeros((1, sums.shape[1]), np.float32), np.cumsum(sums, axis=0, dtype=np.float32)])
-    area_before = np.concatenate([[0.0], np.cumsum(areas)]).astype(np.float32)
+    wedges = np.column_stack([sums, areas]).astype(np.float32)
+    before = np.concatenate([np.zeros_like(wedges[:1]), np.cumsum(wedges, axis=0)])
     one, two = (before[first[:, k + 1]] - before[first[:, k]] for k in (0, 1))
-    area_one, area_two = ((area_before[first[:, k + 1]] - area_before[first[:, k]])[:, None] for k in (0, 1))
-    three, area_three = before[-1] - one - two, area_before[-1] - area_one - area_two
-    means = (one / area_one, two / area_two, three / area_three)
-    rest = squares - one * means[0] - two * means[1] - three * means[2]
-    boundary = (means[0] - means[1]) ** 2 * (area_one * area_two / (area_one + area_two))
-    for (a, area_a), (b, area_b) in (
-        ((means[1], area_two), (means[2], area_three)),
-        ((means[2], area_three), (means[0], area_one)),
-    ):
-        np.minimum(boundary, (a - b) ** 2 * (area_a * area_b / (area_a + area_b)), out=boundary)
-    return np.asarray(boundary / (np.maximum(rest, 0.0) + area_before[-1]))
+    sectors = np.stack([one, two, before[-1] - one - two])
+    area = sectors[..., -1:]
+    means = sectors[..., :-1] / area
+    rest = squares - (sectors[..., :-1] * means).sum(axis=0)
+    other, other_area = means[[1, 2, 0]], area[[1, 2, 0]]
+    boundary = ((means - other) ** 2 * (area * other_area / (area + other_area))).min(axis=0)
+    return np.asarray(boundary / (np.maximum(rest, 0.0) + before[-1, -1]))

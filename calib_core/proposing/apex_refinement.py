@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import Indices
 from calib_core.errors import CalibrationError
 from calib_core.proposing.apex import Apex, find_apex
-from calib_core.proposing.image_candidates import ImageCandidate, surroundings_of
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.still_images import FrameSource, in_light_of, stack_median
 
 _REACHES = (0.45, 0.25)
@@ -21,8 +21,6 @@ _APEX_GAIN = 2.0
 _ABOVE_BLOB, _BLOB_SIGMA = 0.2, 0.22
 """How far above a blob's centre the apex lies on average, and its standard deviation per axis, in widths of the reflector."""
 _MOST = 8
-_KEPT, _KEPT_PX = 1.6, 32.0
-"""How much of the image around a candidate is kept: so many widths of the reflector, and so many pixels more."""
 
 
 def full_image(numbers: Indices, frames: FrameSource) -> np.ndarray | None:
@@ -60,8 +58,7 @@ def with_apexes(candidates: Sequence[ImageCandidate], image: np.ndarray, width_p
         if all(float(np.hypot(*(moved.pixel_px - other.pixel_px))) > 0.3 * width_px for other in found):
             found.append(moved)
     found.sort(key=lambda one: -one.strength)
-    half_px = _KEPT * width_px + _KEPT_PX
-    return tuple(replace(one, surroundings=surroundings_of(image, one.pixel_px, half_px)) for one in found[:_MOST])
+    return tuple(found[:_MOST])
 
 
 def _at_apex(candidate: ImageCandidate, image: np.ndarray, width_px: float, *, tried: bool) -> ImageCandidate:

@@ -10,7 +10,7 @@ from calib_core.camera import Camera
 from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.apex_refinement import full_image
 from calib_core.proposing.dwell_views import DwellView, width_seen_px, with_blobs
-from calib_core.proposing.image_candidates import ImageCandidate, Surroundings
+from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.still_images import FrameSource
 
 _HALF = 0.75
@@ -23,8 +23,6 @@ _FINER = 4.0
 _ROUGH_WIDTH_PX, _FINE_WIDTH_PX = 24.0, 64.0
 """How wide a reflector is at most when candidates are compared roughly, and then at most four times finer than recorded."""
 _REFINED = 4
-_LOOKS = 2
-"""How many looks are tried in a dwell: those of the most similar size."""
 _APART = 0.3
 """Widths between two candidates at least."""
 _CLICK_SIGMA_PX = 1.0
@@ -125,17 +123,17 @@ def _looked_at(view: DwellView, looks: Sequence[Appearance], frames: FrameSource
     larger = float(np.median([look.larger for look in looks]))
     if larger != 1.0 and view.change.size:
         view = with_blobs(replace(view, width_px=larger * view.width_px))
-    seen = _with_surroundings(view, frames)
-    near = sorted(looks, key=lambda look: _unlike_in_size(look, view.width_px))[:_LOOKS]
-    rough = [(_best_match(one, near, view.width_px, _ROUGH_WIDTH_PX, 1.0), one) for one in seen]
-    rough.sort(key=lambda pair: -pair[0].likeness)
+    image = full_image(view.clear, frames) if view.candidates else None
+    if image is None:
+        return replace(view, candidates=())
+    look = min(looks, key=lambda one: _unlike_in_size(one, view.width_px))
+    least = min(1.0, _ROUGH_WIDTH_PX / view.width_px)
+    rough = [replace(one, likeness=_match(image, one, look, view.width_px, least)[0]) for one in view.candidates]
+    rough.sort(key=lambda one: -one.likeness)
     candidates: list[ImageCandidate] = []
     size_px = np.array([camera.width_px, camera.height_px])
-    for index, (match, candidate) in enumerate(rough):
-        moved = replace(candidate, likeness=match.likeness)
-        if index < _REFINED:
-            fine = _best_match(candidate, [match.look], view.width_px, _FINE_WIDTH_PX, _FINER)
-            moved = _moved(candidate, fine, view.width_px)
+    for index, candidate in enumerate(rough):
+        moved = _moved(image, candidate, look, view.width_px) if index < _REFINED else candidate
         inside = bool(((moved.pixel_px > -0.5) & (moved.pixel_px < size_px - 0.5)).all())
         if inside and all(
             np.hypot(*(moved.pixel_px - other.pixel_px)) > _APART * view.width_px for other in candidates
@@ -146,120 +144,58 @@ def _looked_at(view: DwellView, looks: Sequence[Appearance], frames: FrameSource
     return replace(view, candidates=tuple(candidates))
 
 
-def _with_surroundings(view: DwellView, frames: FrameSource) -> list[ImageCandidate]:
-    """Return the candidates of which the image is known; frames are decoded only where it was not kept."""
-    if all(candidate.surroundings is not None for candidate in view.candidates):
-        return list(view.candidates)
-    image = full_image(view.clear if len(view.clear) else view.frames, frames)
-    if image is None:
-        return []
-    whole = Surroundings(image, np.zeros(2))
-    return [
-        candidate if candidate.surroundings is not None else replace(candidate, surroundings=whole)
-        for candidate in view.candidates
-    ]
-
-
 def _unlike_in_size(look: Appearance, width_px: float) -> float:
     """Return how badly a look suits a size: a larger one shows more than a smaller one."""
     ratio = float(np.log(look.width_px / width_px))
     return ratio if ratio >= 0.0 else -2.0 * ratio
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Match:
-    """Where a look is found near a candidate, and how alike it is there."""
-
-    pixel_px: Vector2
-    likeness: float
-    look: Appearance
-
-
-def _best_match(
-    candidate: ImageCandidate, looks: Sequence[Appearance], width_px: float, at_width_px: float, finer: float
-) -> _Match:
-    fine = min(finer, at_width_px / width_px)
-    return max((_match(candidate, look, width_px, fine) for look in looks), key=lambda match: match.likeness)
-
-
-def _match(candidate: ImageCandidate, look: Appearance, width_px: float, fine: float) -> _Match:
-    """Correlate a look with the surroundings of a candidate, at the scale of its range and `fine` times finer."""
+def _match(
+    image: np.ndarray, candidate: ImageCandidate, look: Appearance, width_px: float, fine: float
+) -> tuple[float, Vector2]:
+    """Return how alike a look is near a candidate, at the scale of its range and `fine` times finer, and where it is most."""
     import cv2
 
-    assert candidate.surroundings is not None, "given by _with_surroundings"
-    template, mask = _template(look, width_px * fine)
-    half_px = _REACH * width_px + template.shape[0] / (2.0 * fine)
-    surroundings, corner_px = _resampled(candidate.surroundings, candidate.pixel_px, half_px, fine)
-    scores = cv2.matchTemplate(surroundings, template, cv2.TM_CCOEFF_NORMED, mask=mask)
+    half = max(3, int(np.ceil(_HALF * width_px * fine)))
+    middle_px = np.array(look.patch.shape[1::-1]) // 2 + look.offset_px
+    template = _resampled(look.patch, middle_px, half, width_px * fine / look.width_px)
+    y, x = np.mgrid[-half : half + 1, -half : half + 1]
+    disc = (np.hypot(x, y) <= _DISC * width_px * fine).astype(np.float32)
+    reach = int(np.ceil(_REACH * width_px * fine))
+    around = _resampled(image, candidate.pixel_px, half + reach, fine)
+    scores = cv2.matchTemplate(around, template, cv2.TM_CCOEFF_NORMED, mask=np.repeat(disc[..., None], 3, axis=2))
     scores[~np.isfinite(scores)] = -1.0
-    row, column = (int(v) for v in np.unravel_index(int(np.argmax(scores)), scores.shape))
-    peak = np.array([column, row]) + _below_a_pixel(scores, row, column) + 0.5 * (template.shape[0] - 1)
-    return _Match(corner_px + peak / fine, float(np.clip(scores[row, column], -1.0, 1.0)), look)
+    _, likeness, _, peak = cv2.minMaxLoc(scores)
+    return min(likeness, 1.0), candidate.pixel_px + (np.array(peak) - reach) / fine
 
 
-def _moved(candidate: ImageCandidate, match: _Match, width_px: float) -> ImageCandidate:
+def _moved(image: np.ndarray, candidate: ImageCandidate, look: Appearance, width_px: float) -> ImageCandidate:
     """Move a candidate to where the look is found, and on to an apex there that may be what was clicked."""
-    look, likeness = match.look, match.likeness
+    likeness, found_px = _match(image, candidate, look, width_px, min(_FINER, _FINE_WIDTH_PX / width_px))
     carried_px = look.sigma_px * width_px / look.width_px
     sigma_px = float(np.hypot(carried_px, _CARRIED_PX + _CARRIED * width_px * (1.0 - likeness)))
     reach_px = max(_LEAST_SNAP_PX, _AGREES * width_px) if look.at_apex else min(2.0 * sigma_px, _AGREES * width_px)
     if likeness >= _LEAST_LIKENESS:
-        if candidate.has_apex and float(np.hypot(*(candidate.pixel_px - match.pixel_px))) <= reach_px:
+        if candidate.has_apex and float(np.hypot(*(candidate.pixel_px - found_px))) <= reach_px:
             return replace(candidate, likeness=likeness)
-        assert candidate.surroundings is not None, "given by _with_surroundings"
-        corner_px = candidate.surroundings.corner_px
-        near_px = match.pixel_px - corner_px
-        apex = find_apex(candidate.surroundings.image, near_px, reach_px=reach_px, size_px=width_px)
+        apex = find_apex(image, found_px, reach_px=reach_px, size_px=width_px)
         if isinstance(apex, Apex):
-            at_px = corner_px + apex.pixel_px
-            return replace(candidate, pixel_px=at_px, sigma_px=apex.sigma_px, likeness=likeness, has_apex=True)
-    return replace(candidate, pixel_px=match.pixel_px, sigma_px=sigma_px, likeness=likeness, has_apex=False)
+            at_px, sigma_px = apex.pixel_px, apex.sigma_px
+            return replace(candidate, pixel_px=at_px, sigma_px=sigma_px, likeness=likeness, has_apex=True)
+    return replace(candidate, pixel_px=found_px, sigma_px=sigma_px, likeness=likeness, has_apex=False)
 
 
-def _template(look: Appearance, width_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the look at another size, its confirmed pixel in the middle, and the disc that is compared: float32."""
+def _resampled(image: np.ndarray, centre_px: Vector2, half: int, finer: float) -> np.ndarray:
+    """Return what lies around a pixel, `finer` times finer: (2 half + 1, 2 half + 1, 3) float32."""
     import cv2
 
-    scale = width_px / look.width_px
-    patch: np.ndarray = look.patch.astype(np.float32)
-    if scale < 1.0:
-        patch = cv2.GaussianBlur(patch, (0, 0), max(0.01, 0.35 * np.sqrt(1.0 / scale**2 - 1.0)))
-    half = max(3, int(np.ceil(_HALF * width_px)))
-    middle = np.array(look.patch.shape[1::-1]) // 2 + look.offset_px
-    move = np.array([[scale, 0.0, half - scale * middle[0]], [0.0, scale, half - scale * middle[1]]])
-    side = (2 * half + 1, 2 * half + 1)
-    template = cv2.warpAffine(patch, move, side, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    y, x = np.mgrid[-half : half + 1, -half : half + 1]
-    disc = (np.hypot(x, y) <= _DISC * width_px).astype(np.float32)
-    return template, np.repeat(disc[..., None], 3, axis=2)
-
-
-def _resampled(
-    surroundings: Surroundings, centre_px: Vector2, half_px: float, fine: float
-) -> tuple[np.ndarray, Vector2]:
-    """Return the surroundings of a pixel on a grid `fine` times finer, and where that grid begins in the full image."""
-    import cv2
-
-    half = int(np.ceil(half_px * fine))
-    corner_px = np.asarray(centre_px) - half / fine
-    part: np.ndarray = surroundings.image.astype(np.float32)
-    if fine < 1.0:
-        part = cv2.GaussianBlur(part, (0, 0), 0.35 * np.sqrt(1.0 / fine**2 - 1.0))
-    begin_px = corner_px - surroundings.corner_px
-    move = np.array([[1.0 / fine, 0.0, begin_px[0]], [0.0, 1.0 / fine, begin_px[1]]])
-    side = (2 * half + 1, 2 * half + 1)
+    reach = int(np.ceil(half / finer)) + 4
+    middle = np.round(centre_px)
+    part = cv2.getRectSubPix(image, (2 * reach + 1, 2 * reach + 1), (float(middle[0]), float(middle[1])))
+    part = part.astype(np.float32)
+    if finer < 1.0:
+        part = cv2.GaussianBlur(part, (0, 0), max(0.01, 0.35 * np.sqrt(1.0 / finer**2 - 1.0)))
+    begin = reach + np.asarray(centre_px) - middle - half / finer
+    move = np.array([[1.0 / finer, 0.0, begin[0]], [0.0, 1.0 / finer, begin[1]]])
     flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
-    return cv2.warpAffine(part, move, side, flags=flags, borderMode=cv2.BORDER_REPLICATE), corner_px
-
-
-def _below_a_pixel(scores: np.ndarray, row: int, column: int) -> Vector2:
-    """Return the peak of the parabolas through a maximum and its neighbours, from that maximum: column, row."""
-    offsets = []
-    for place, line in ((column, scores[row]), (row, scores[:, column])):
-        offset = 0.0
-        if 0 < place < len(line) - 1:
-            before, here, after = (float(line[place + k]) for k in (-1, 0, 1))
-            bend = before - 2.0 * here + after
-            offset = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
-        offsets.append(offset)
-    return np.array(offsets)
+    return cv2.warpAffine(part, move, (2 * half + 1, 2 * half + 1), flags=flags, borderMode=cv2.BORDER_REPLICATE)

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from calib_core.measurements import Facts, ReflectorClick, Unsolvable
 from calib_core.proposing.proposals import Proposal, Proposals
 
@@ -47,15 +45,17 @@ def automatic_clicks(
         placements: how many there are, those with a click included.
         confirmed: clicks of a person that count.
     """
+    from scipy.special import expit
+
     if placements < _LEAST_DWELLS:
         return _refused("few-placements", placements=placements)
     agreement, chance = proposals.agreement, proposals.chance
     if agreement is None or chance is None:
         return _refused("no-mounting")
     if proposals.reflectors < 0.5:
-        return _refused("no-apex")
+        return _refused("fading")
     beyond = (1.0 - _RIVAL_SHARE) * agreement.score - agreement.rival_score
-    alone = 1.0 / (1.0 + float(np.exp(-np.clip((beyond - _MARGIN) / _MARGIN_STEP, -50.0, 50.0))))
+    alone = float(expit((beyond - _MARGIN) / _MARGIN_STEP))
     confidence = _MOST_CONFIDENCE * min(alone, chance.probability)
     scores = {"score": chance.score, "by_chance": chance.bound, "rival": agreement.rival_score}
     if confidence < LEAST_WHOLE_CONFIDENCE:

@@ -1,7 +1,8 @@
 """Candidate rays: what images and radar say of each dwell, as arrays, with the odds before any pose is known."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,9 +31,6 @@ _CLICK_IS_RIGHT = 0.85
 """Probability that a confirmed click is of a dwell, shared between those of its time: a weak reflector may give none."""
 _CLICKED = 0.5
 """A candidate within so many widths of a click is what was clicked."""
-_WEAKER_DB, _WEAKER_STEP_DB = 9.0, 1.5
-"""Echo below the typical one at which a dwell is as likely something else as the reflector, and how fast that changes."""
-_MOST_LOG_ODDS = 30.0
 _LEAST_SIGMA_PX = 1.0
 _REPEATED_PX = 6.0
 """Candidates of two dwells nearer than this show the same place; what moved does not stay there."""
@@ -98,8 +96,9 @@ class CandidateRays:
 
     def at_first(self) -> "CandidateRays":
         """Return each dwell at its first position only."""
-        values = {name: getattr(self, name)[self.first] for name in _OF_POSITIONS}
-        return replace(self, first=np.arange(len(self)), click=self.click[self.first], **values)
+        of_positions = {field.name for field in fields(self)} - {"first", "missing", "is_flat"}
+        values = {name: getattr(self, name)[self.first] for name in of_positions}
+        return replace(self, first=np.arange(len(self)), **values)
 
     def of_dwells(self, values: np.ndarray) -> np.ndarray:
         """Return the sums (..., d, k) of values (..., n, k) over the positions of each dwell: at most one of them is true."""
@@ -110,21 +109,7 @@ class CandidateRays:
         return np.repeat(values, np.diff(self.first, append=len(self.odds)), axis=-1)
 
 
-_OF_POSITIONS = (
-    "positions_radar_m",
-    "polar",
-    "slopes",
-    "sigma_polar",
-    "rays",
-    "tangents",
-    "sigma_rad",
-    "odds",
-    "density",
-)
-
-
-@dataclass(frozen=True, slots=True)
-class _Choice:
+class _Choice(NamedTuple):
     """One candidate of a dwell: a place in the image, or a confirmed click."""
 
     u_px: float
@@ -149,21 +134,19 @@ def candidate_rays(
         options: noise of the radar and of clicks.
         confirmed: clicks; one that lies within several dwells is a candidate of each.
     """
-    below_db = weaker_db(views)
     shared_by = [sum(_is_within(click, view) for view in views) for click in confirmed]
     placements = [view.placement.at_each for view in views]
     choices = [
-        [replace(one, odds=one.odds * placement.likely) for one in own]
-        for view, at_each, db in zip(views, placements, below_db, strict=True)
-        for own in [_choices(view, db, options, confirmed, shared_by)]
+        [one._replace(odds=one.odds * placement.likely) for one in own]
+        for view, at_each in zip(views, placements, strict=True)
+        for own in [_choices(view, options, confirmed, shared_by)]
         for placement in at_each
     ]
     counts = [len(at_each) for at_each in placements]
     first = np.append(0, np.cumsum(counts)[:-1])
     most = max(1, max(len(own) for own in choices))
-    padded = [[*own, *[_Choice(0.0, 0.0, 1.0, 0.0)] * (most - len(own))] for own in choices]
-    values = np.array([[(one.u_px, one.v_px, one.sigma_px, one.odds) for one in own] for own in padded])
-    pixels, sigma_px, odds = values[..., :2], values[..., 2], values[..., 3]
+    values = np.array([[*own, *[_Choice(0.0, 0.0, 1.0, 0.0)] * (most - len(own))] for own in choices])
+    pixels, (sigma_px, odds, click) = values[..., :2], np.moveaxis(values[..., 2:], -1, 0)
     rays, radians = _rays(pixels.reshape(-1, 2), camera)
     rays, per_px = rays.reshape(*odds.shape, 3), radians.reshape(odds.shape)
     seen = np.isfinite(rays).all(axis=-1) & np.isfinite(per_px)
@@ -185,7 +168,7 @@ def candidate_rays(
         odds=odds,
         missing=np.maximum(1.0 - np.add.reduceat(odds.sum(axis=1), first), _LEAST_MISSING),
         density=_density(pixels, odds, apart, camera) / per_px**2,
-        click=np.array([[one.click for one in own] for own in padded], dtype=np.int64),
+        click=click.astype(np.int64),
         is_flat=flat,
     )
 
@@ -196,19 +179,8 @@ def _sigma_polar(options: CalibrationOptions, *, flat: bool) -> Values:
     return np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), elevation_rad])
 
 
-def weaker_db(views: Sequence[DwellView]) -> Values:
-    """Return how far each echo, corrected for range, lies below the typical one (n,) [dB]; 0 where unknown."""
-    range_m = np.array([np.linalg.norm(view.placement.position_radar_m) for view in views])
-    echo_db = np.array([view.placement.snr_db for view in views]) + 40.0 * np.log10(np.maximum(range_m, 1e-3))
-    known = np.isfinite(echo_db)
-    if not known.any():
-        return np.zeros(len(views))
-    return np.where(known, np.median(echo_db[known]) - np.where(known, echo_db, 0.0), 0.0)
-
-
 def _choices(
     view: DwellView,
-    below_db: float,
     options: CalibrationOptions,
     confirmed: Sequence[ReflectorClick],
     shared_by: Sequence[int],
@@ -225,14 +197,13 @@ def _choices(
         for row, click in enumerate(confirmed)
         if _is_within(click, view)
     ]
-    share = _PRESENT / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
-    share *= 1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT)
+    share = _PRESENT * (1.0 - min(sum(click.odds for click in clicks), _CLICK_IS_RIGHT))
     found = []
     for one, odds in zip(view.candidates, _odds(view.candidates), strict=True):
         u_px, v_px = one.pixel_px.tolist()
         clicked = any(np.hypot(u_px - own.u_px, v_px - own.v_px) <= _CLICKED * view.width_px for own in clicks)
         found.append(_Choice(u_px, v_px, one.sigma_px, 0.0 if clicked else float(share * odds)))
-    return [*(replace(click, odds=click.odds / len(clicks)) for click in clicks), *found]
+    return [*(click._replace(odds=click.odds / len(clicks)) for click in clicks), *found]
 
 
 def _is_within(click: ReflectorClick, view: DwellView) -> bool:

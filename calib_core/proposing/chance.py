@@ -70,9 +70,9 @@ class Chance:
     @property
     def probability(self) -> float:
         """Probability that the agreement is no chance."""
-        if not len(self.by_chance):
-            return 0.0
-        return 1.0 / (1.0 + float(np.exp(np.clip((self.bound - self.score) / (_GUMBEL * self._spread), -50.0, 50.0))))
+        from scipy.special import expit
+
+        return float(expit((self.score - self.bound) / (_GUMBEL * self._spread))) if len(self.by_chance) else 0.0
 
     @property
     def _spread(self) -> float:

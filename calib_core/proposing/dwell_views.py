@@ -176,7 +176,12 @@ def with_blobs(view: DwellView, *, rough: bool = False) -> DwellView:
     width_px = view.width_px / factor
     response = _response(change, without, width_px)
     found = blobs(response, width_px, most=_ROUGH_MOST) if rough else blobs(response, width_px)
-    return replace(view, candidates=tuple(_full(blob, factor) for blob in found))
+    return replace(
+        view,
+        candidates=tuple(
+            replace(one, pixel_px=(one.pixel_px + 0.5) * factor - 0.5, sigma_px=one.sigma_px * factor) for one in found
+        ),
+    )
 
 
 def _reduced(changes: np.ndarray, factor: int) -> np.ndarray:
@@ -206,29 +211,6 @@ def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
 def has_changed(view: DwellView, pixel_px: Vector2) -> bool:
     """Return whether something of any width changed at a pixel (2,) of the full image."""
     return bool(view.change.size) and bool(_contrast_by_width(view, pixel_px)[1].max() > _LEAST_SIGMAS)
-
-
-def is_upright(view: DwellView, pixel_px: Vector2) -> bool | None:
-    """Return whether what changed at a pixel is as much taller than wide as a person is; None if nothing changed there.
-
-    Args:
-        view: of a dwell.
-        pixel_px: (2,) of the full image.
-    """
-    import cv2
-
-    if not view.change.size:
-        return None
-    changed = (view.change.min(axis=0) > 0.5 * _MOST_SIGMAS * _LEVELS_PER_SIGMA).astype(np.uint8)
-    labels = cv2.connectedComponents(changed)[1]
-    column, row = np.round((np.asarray(pixel_px) + 0.5) / view.factor - 0.5).astype(int).tolist()
-    half = max(1, round(0.5 * view.width_px / view.factor))
-    around = labels[max(0, row - half) : row + half + 1, max(0, column - half) : column + half + 1]
-    if not around.any():
-        return None
-    thing = labels == np.bincount(around[around > 0]).argmax()
-    spans = np.count_nonzero(thing, axis=1)
-    return bool(thing.sum() > _UPRIGHT * np.quantile(spans[spans > 0], _WIDE_ROWS) ** 2)
 
 
 def _contrast_by_width(view: DwellView, pixel_px: Vector2) -> tuple[Values, Values]:
@@ -273,11 +255,6 @@ def _without_images(view: DwellView) -> DwellView:
     return replace(view, image=view.image[:0], stills=()) if view.stills else view
 
 
-def _full(candidate: ImageCandidate, factor: float) -> ImageCandidate:
-    pixel_px = (candidate.pixel_px + 0.5) * factor - 0.5
-    return replace(candidate, pixel_px=pixel_px, sigma_px=candidate.sigma_px * factor)
-
-
 _OTHERS = 9
 _LEAST_OTHERS = 2
 """Other still images that are needed to say what changed."""
@@ -297,15 +274,10 @@ _SURROUNDINGS = 4.0
 """How much of the image around a place its width is judged by, in widths."""
 _RING = 1.2
 """Weight of the mean around the square: what is larger than a reflector, such as a person, cancels."""
-_PART, _PART_COUNTS = 0.6, 0.8
-"""Width of a part of the reflector that is looked for as well, and how much it counts."""
 _NEXT = 1.2
 """How far on both sides of a place a limb goes on, in widths of the reflector."""
 _BODY = (1.6, 3.0)
 """Width and height of what is taken for a body below a head, in widths of the reflector."""
-_UPRIGHT, _WIDE_ROWS = 1.8, 0.9
-"""Area over the square of the width, which nine of ten rows do not exceed: a square has 1, a person of 1.7 m by 0.5 m about 3.
-The threshold is the geometric mean of both."""
 _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
 
@@ -333,9 +305,9 @@ def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.nd
         without: (l, h, w) of those without it.
         width_px: of the reflector in these images.
     """
-    response: np.ndarray = np.min([_of_size(one, width_px) for one in change], axis=0)
+    response: np.ndarray = np.min([_stands_out(one, width_px) for one in change], axis=0)
     for one in without:
-        response -= np.maximum(_of_size(one, width_px), np.float32(0.0))
+        response -= np.maximum(_stands_out(one, width_px), np.float32(0.0))
     return response
 
 
@@ -385,17 +357,11 @@ class _Usual:
         return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", off, off)))
 
 
-def _of_size(change: np.ndarray, width_px: float) -> np.ndarray:
-    """Return how far a place of about one size stands out [sigmas]; part of the reflector may look like what is behind it."""
-    change = change.astype(np.float32) * np.float32(1.0 / _LEVELS_PER_SIGMA)
-    whole, part = (_stands_out(change, share * width_px) for share in (1.0, _PART))
-    return np.maximum(whole, np.float32(_PART_COUNTS) * part)
-
-
 def _stands_out(change: np.ndarray, width_px: float) -> np.ndarray:
-    """Return the mean change in a square of one size, less that around it."""
+    """Return the mean change in a square of one size, less that around it [sigmas]."""
     import cv2
 
+    change = change.astype(np.float32) * np.float32(1.0 / _LEVELS_PER_SIGMA)
     side = max(3, 2 * round(0.5 * width_px) + 1)
     inner = cv2.blur(change, (side, side))
     wide = 2 * side + 1

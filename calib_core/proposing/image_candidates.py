@@ -14,22 +14,6 @@ _BLOB_SIGMA = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
-    """A part of the full image around a candidate, kept so that no frame is decoded again.
-
-    Attributes:
-        image: (n, m, 3) uint8.
-        corner_px: (2,) whole column and row of its first pixel in the full image.
-    """
-
-    image: np.ndarray
-    corner_px: Vector2
-
-    def __post_init__(self) -> None:
-        freeze(self, corner_px=(2,))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class ImageCandidate:
     """A place in the image where the reflector may stand.
 
@@ -39,7 +23,6 @@ class ImageCandidate:
         strength: how much the place differs from the same place in other dwells, in standard deviations of these.
         likeness: correlation with the reflector that a person confirmed, -1 to 1; NaN before anything is confirmed.
         has_apex: three sheets that meet in one point were found there.
-        surroundings: what the full image shows there; None where it was not looked at.
     """
 
     pixel_px: Vector2
@@ -47,7 +30,6 @@ class ImageCandidate:
     strength: float
     likeness: float = float("nan")
     has_apex: bool = False
-    surroundings: Surroundings | None = None
 
     def __post_init__(self) -> None:
         freeze(self, pixel_px=(2,))
@@ -73,16 +55,3 @@ def blobs(response: np.ndarray, width_px: float, *, most: int = _MOST) -> tuple[
         candidates.append(ImageCandidate(pixel_px, _BLOB_SIGMA * width_px, strength))
         left[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1] = -np.inf
     return tuple(candidates)
-
-
-def surroundings_of(image: np.ndarray, pixel_px: Vector2, half_px: float) -> Surroundings:
-    """Copy what an image shows up to some distance from a pixel.
-
-    Args:
-        image: (h, w, 3) uint8.
-        pixel_px: (2,) within it.
-        half_px: how far up, down, left and right.
-    """
-    left, top = (max(0, int(v - half_px)) for v in pixel_px)
-    right, bottom = (int(v + half_px) + 1 for v in pixel_px)
-    return Surroundings(image[top:bottom, left:right].copy(), np.array([left, top], dtype=np.float64))

@@ -10,8 +10,7 @@ Several rough poses are refined at once (expectation maximization): each candida
 given the pose; each step then solves for rotation, camera position and the scales of the radar's angles, with the mounting as
 prior. Tolerances shrink from step to step, and the noise level that explains a recording best is kept.
 
-A person who goes from place to place is seen by the radar and in the images alike; but where a reflector is large enough in
-the image its three sheets meet in a point, and a person's clothes rarely do.
+A person who goes from place to place is seen by the radar and in the images alike, but the echo of many parts that move fades.
 """
 
 from collections.abc import Sequence
@@ -23,7 +22,7 @@ import numpy as np
 from calib_core.arrays import Flags, Indices, Points2, Values, freeze
 from calib_core.geometry import RigidTransform, rotation_exp, skews
 from calib_core.proposing.candidate_rays import CandidateRays
-from calib_core.proposing.dwell_views import DwellView, is_upright
+from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
 
 NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
@@ -138,7 +137,9 @@ class PoseAgreement:
     @property
     def pose_probability(self) -> float:
         """Probability of the pose against its rival."""
-        return float(1.0 / (1.0 + np.exp(min((self.rival_score - self.score) / _RIVAL_STEP, 50.0))))
+        from scipy.special import expit
+
+        return float(expit((self.score - self.rival_score) / _RIVAL_STEP))
 
 
 def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24) -> PoseAgreement | None:
@@ -219,18 +220,16 @@ def _with_nominal(poses: RoughPoses, information: np.ndarray, prior: MountingPri
 
 def _from_first_click(rays: CandidateRays, prior: MountingPrior) -> RoughPoses:
     """Return the poses nearest to the mounting that turn a dwell of the first click onto it, for each of its dwells."""
-    dwells, columns = np.nonzero(rays.click == rays.click[rays.click >= 0].min())
-    rotations, centres = [], []
-    for centre in prior.starts_m:
-        directions = _directions(rays, centre)
-        for dwell, column in zip(dwells.tolist(), columns.tolist(), strict=True):
-            thought = prior.rotation @ directions[dwell]
-            axis = np.cross(thought, rays.rays[dwell, column])
-            sine = float(np.linalg.norm(axis))
-            angle = float(np.arctan2(sine, thought @ rays.rays[dwell, column]))
-            rotations.append(rotation_exp(axis[None] * (angle / max(sine, 1e-12)))[0] @ prior.rotation)
-            centres.append(centre)
-    return RoughPoses.of_rotations(np.array(rotations), np.array(centres), np.zeros(len(centres)), 0)
+    from scipy.spatial.transform import Rotation
+
+    places, columns = np.nonzero(rays.click == rays.click[rays.click >= 0].min())
+    turns = [
+        Rotation.align_vectors(rays.rays[place, column], prior.rotation @ directions[place])[0].as_matrix()
+        for directions in (_directions(rays, centre) for centre in prior.starts_m)
+        for place, column in zip(places, columns, strict=True)
+    ]
+    centres = np.repeat(prior.starts_m, len(places), axis=0)
+    return RoughPoses.of_rotations(np.array(turns) @ prior.rotation, centres, np.zeros(len(centres)), 0)
 
 
 def _row(poses: RoughPoses, row: int) -> RoughPoses:
@@ -307,22 +306,17 @@ def rotation_consensus(
         tried: how many to compare at most, about each start.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
-    by_start: list[RoughPoses] = []
     found = [
         (centre, _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))) for centre in prior.starts_m
     ]
+    apart = []
     for (centre, rotations), scores in zip(found, _rotation_scores(rays, prior, found), strict=True):
         kept = _best_apart(rotations, scores, most)
-        centres = np.tile(centre, (len(kept), 1))
-        by_start.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
-    scores = np.concatenate([poses.scores for poses in by_start])
+        apart.append((rotations[kept], np.tile(centre, (len(kept), 1)), scores[kept]))
+    rotations, centres, scores = (np.concatenate(each) for each in zip(*apart, strict=True))
     order = np.argsort(-scores, kind="stable")[:most]
-    return RoughPoses.of_rotations(
-        np.concatenate([poses.rotations for poses in by_start])[order],
-        np.concatenate([poses.centres_radar_m for poses in by_start])[order],
-        scores[order],
-        sum(poses.tried for poses in by_start),
-    )
+    compared = sum(len(rotations) for _, rotations in found)
+    return RoughPoses.of_rotations(rotations[order], centres[order], scores[order], compared)
 
 
 def _directions(rays: CandidateRays, centre: np.ndarray) -> np.ndarray:
@@ -524,27 +518,12 @@ def _scores(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> Val
 
 def _prior_offsets(prior: MountingPrior, poses: RoughPoses) -> tuple[np.ndarray, Values]:
     """Return how far poses are from the mounting (m, 8), and the prior's precision (8,)."""
-    relative = poses.rotations @ prior.rotation.T
-    offsets = np.concatenate(
-        [_rotation_logs(relative), poses.centres_radar_m - prior.centre_radar_m, poses.scales], axis=1
-    )
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_matrix(poses.rotations @ prior.rotation.T).as_rotvec()
+    offsets = np.concatenate([turned, poses.centres_radar_m - prior.centre_radar_m, poses.scales], axis=1)
     sigma = np.concatenate([np.full(3, prior.rotation_sigma_rad), prior.centre_sigma_m, prior.scale_sigma])
     return offsets, sigma**-2.0
-
-
-def _rotation_logs(rotations: np.ndarray) -> np.ndarray:
-    """Return the rotation vectors (m, 3) of rotations (m, 3, 3) well below half a turn."""
-    axis = 0.5 * np.stack(
-        [
-            rotations[:, 2, 1] - rotations[:, 1, 2],
-            rotations[:, 0, 2] - rotations[:, 2, 0],
-            rotations[:, 1, 0] - rotations[:, 0, 1],
-        ],
-        axis=1,
-    )
-    sine = np.linalg.norm(axis, axis=1)
-    angle = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
-    return np.asarray(axis * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)[:, None])
 
 
 def _true_positions(rays: CandidateRays, poses: RoughPoses) -> np.ndarray:
@@ -562,21 +541,11 @@ def _true_positions(rays: CandidateRays, poses: RoughPoses) -> np.ndarray:
     return np.asarray(points * np.sqrt(np.maximum(1.0 - (height_m / range_m) ** 2, _LEAST_SHARE_SQUARED))[..., None])
 
 
-_WIDE_ENOUGH_PX = 16.0
-"""Width of a reflector whose apex can be seen."""
-
-_OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
-"""Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
-
-_UPRIGHT_PERSON, _UPRIGHT_REFLECTOR = 0.85, 0.15
-"""Share of the places without an apex that are much taller than wide: 23 of 26 people in simulated recordings, and a reflector
-on a stand that is as wide as itself, or one with somebody behind it."""
-
 _BEFORE = 1.0
-"""Log-odds before any image: most recordings contain a reflector."""
+"""Log-odds before any echo: most recordings contain a reflector."""
 
 _LEAST_SEEN = 3
-"""Fewer places that tell say nothing."""
+"""Fewer echoes say nothing."""
 
 _STEADY_DB, _RAYLEIGH_DB, _FADING_SPREAD = 1.0, 5.57, 0.5
 """How far the echo of one surface scatters, by the receiver's noise, and that of many which move (Rayleigh's distribution of
@@ -585,43 +554,18 @@ amplitudes, in decibels); and the standard deviation of the logarithm of both.""
 _PRESENT = 0.5
 
 
-def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement, *, by_shape: bool = False) -> float:
-    """Return the log-odds that what stood there is a reflector and not a person; infinite where too little is told.
-
-    An echo that fades speaks against it, and a place that is wide enough to show an apex and shows none, unless the thing is not
-    upright, as a board around small sheets.
+def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
+    """Return the log-odds that what stood there is a reflector and not a person, whose echo fades; infinite where it is unknown.
 
     Args:
-        views: as the agreement was found for, without confirmed clicks.
-        agreement: its most probable candidates are looked at.
-        by_shape: whether what is too small for an apex is told by its shape alone: a reflector on a tripod is upright, too.
+        views: as the agreement was found for.
+        agreement: the dwells with a probable candidate count.
     """
-    log_odds, count, fading_db = 0.0, 0, []
-    for view, row, probability in zip(views, agreement.likeliest.tolist(), agreement.probability, strict=True):
-        wide = view.width_px >= _WIDE_ENOUGH_PX
-        if probability[row] < _PRESENT:
-            continue
-        fading_db.append(view.placement.fading_db)
-        if not (wide or by_shape):
-            continue
-        candidate = view.candidates[row]
-        upright = None if candidate.has_apex else is_upright(view, candidate.pixel_px)
-        if wide:
-            shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
-            seen = shares if candidate.has_apex else 1.0 - shares
-            log_odds += float(np.log(seen[0] / seen[1]))
-        if upright is False or (upright and not wide):
-            log_odds += float(np.log(_UPRIGHT_PERSON / _UPRIGHT_REFLECTOR)) * (-1.0 if upright else 1.0)
-        count += wide or upright is not None
-    known_db = np.array(fading_db)[np.isfinite(fading_db)]
-    if max(count, len(known_db)) < _LEAST_SEEN:
+    shown = agreement.probability.max(axis=1) >= _PRESENT
+    fading_db = np.array([view.placement.fading_db for view in views])[shown]
+    known_db = fading_db[np.isfinite(fading_db)]
+    if len(known_db) < _LEAST_SEEN:
         return float("inf")
-    by_echo = _steadiness(float(np.median(known_db))) if len(known_db) >= _LEAST_SEEN else 0.0
-    return _BEFORE + by_echo + (log_odds if count >= _LEAST_SEEN else 0.0)
-
-
-def _steadiness(fading_db: float) -> float:
-    """Return the log-odds that an echo which scatters so far is of one surface."""
     steady, faded = np.log([_STEADY_DB, _RAYLEIGH_DB])
-    off = float(np.clip(np.log(max(fading_db, 1e-3)), steady, faded))
-    return float((faded - off) ** 2 - (steady - off) ** 2) / (2.0 * _FADING_SPREAD**2)
+    off = float(np.clip(np.log(max(np.median(known_db), 1e-3)), steady, faded))
+    return _BEFORE + float((faded - off) ** 2 - (steady - off) ** 2) / (2.0 * _FADING_SPREAD**2)

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Points2, Values
+from calib_core.arrays import Points2
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
+from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays
 from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
@@ -36,7 +36,6 @@ _SLIPS, _SLIP_PX, _UNREPORTED = 0.05, 50.0, 0.15
 _MORE_LIKELY = 0.5
 _FEW_DWELLS = 5
 _FAR_SIGMA = 3.5
-_WEAK_ECHO_DB = 6.0
 _SAME_PLACE = 3.0
 """Standard deviations between two candidates that are one place."""
 _VAGUE_PX = 3.0
@@ -45,9 +44,7 @@ _NO_FRAME = "no camera frame of it"
 _NO_CHANGE = "no change of the reflector's size"
 _NO_POSE = "image and radar agree on no pose yet; click the first two placements yourself"
 _OPEN = "more clicks will help"
-_A_PERSON = (
-    "it may be a person: no inner corner, or a fading echo; if it is the reflector, click two placements yourself"
-)
+_A_PERSON = "its echo fades as a person's does; if it is the reflector, click two placements yourself"
 _ELSEWHERE = "no change where the other placements expect it"
 _TWO_PLACES = "two spots are about as likely"
 _TAKEN = "the only likely spot is another reflector's"
@@ -161,7 +158,6 @@ class _Judged:
         trusted: probability that the pose is right, and that reflectors stood there.
         reflectors: the second of these alone.
         taken: (n, k) candidates that show what another dwell of the same time chose.
-        weaker_db: (n,) echo below the typical one.
     """
 
     views: Sequence[DwellView]
@@ -171,7 +167,6 @@ class _Judged:
     trusted: float
     reflectors: float
     taken: np.ndarray
-    weaker_db: Values
 
     @classmethod
     def of(
@@ -183,11 +178,13 @@ class _Judged:
         chance: Chance | None,
     ) -> "_Judged":
         """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
+        from scipy.special import expit
+
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None and chance is not None:
             trusted = agreement.pose_probability * chance.probability
             if by_clicks is None:
-                reflectors = _logistic(reflector_log_odds(views, agreement, by_shape=chance.wider != 1.0))
+                reflectors = float(expit(reflector_log_odds(views, agreement)))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
         if by_clicks is not None:
@@ -195,7 +192,7 @@ class _Judged:
         probability = _tempered(probability)
         taken = _taken_by_others(views, rays, probability)
         sure = np.where(taken, 0.0, probability)
-        return cls(views, rays, agreement, sure, trusted, reflectors, taken, weaker_db(views))
+        return cls(views, rays, agreement, sure, trusted, reflectors, taken)
 
     def proposal(self, i: int) -> Proposal | None:
         """Propose the most probable candidate of a dwell; None if it is probably wrong."""
@@ -225,8 +222,6 @@ class _Judged:
             return _NO_CHANGE if len(view.frames) else _NO_FRAME
         if self.taken[i].any() and self.probability[i].max() < LEAST_CONFIDENCE:
             return _TAKEN
-        if self.weaker_db[i] > _WEAK_ECHO_DB:
-            return f"its echo is {self.weaker_db[i]:.0f} dB weaker than the others': probably not the reflector"
         if self.reflectors < _MORE_LIKELY:
             return _A_PERSON
         if self.agreement is None or self.trusted < _MORE_LIKELY:
@@ -248,14 +243,11 @@ class _Judged:
         return _NO_POSE if len(self.rays) >= _FEW_DWELLS else _FEW
 
 
-def _logistic(log_odds: float) -> float:
-    return 1.0 / (1.0 + float(np.exp(-np.clip(log_odds, -50.0, 50.0))))
-
-
 def _tempered(probability: Points2) -> Points2:
     """Return probabilities as they were borne out, nearer to one half."""
-    bounded = np.clip(probability, 1e-12, 1.0 - 1e-6)
-    return np.asarray(np.where(probability > 0.0, 1.0 / (1.0 + (1.0 / bounded - 1.0) ** (1.0 / _TEMPER)), 0.0))
+    from scipy.special import expit, logit
+
+    return np.asarray(expit(logit(np.minimum(probability, 1.0 - 1e-6)) / _TEMPER))
 
 
 def _compared_with_click(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:

@@ -4,9 +4,8 @@ While two reflectors are moved in turn, their dwells overlap; a dwell then has a
 that stood together, so that what changed can be told apart. Images are brought to one light before they are compared.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -162,31 +161,13 @@ def stack_median(images: Sequence[np.ndarray]) -> np.ndarray:
     import cv2
 
     stack = list(images)
-    for low, high in _exchanges(len(stack)):
-        stack[low], stack[high] = cv2.min(stack[low], stack[high]), cv2.max(stack[low], stack[high])
     middle = len(stack) // 2
+    for last in range(len(stack) - 1, max(middle - 2, 0), -1):  # the largest of what is left rises to the end
+        for low in range(last):
+            stack[low], stack[low + 1] = cv2.min(stack[low], stack[low + 1]), cv2.max(stack[low], stack[low + 1])
     if len(stack) % 2:
         return np.asarray(stack[middle])
     return np.asarray(cv2.addWeighted(stack[middle - 1], 0.5, stack[middle], 0.5, 0.0))
-
-
-@lru_cache(maxsize=32)
-def _exchanges(count: int) -> tuple[tuple[int, int], ...]:
-    """Return the exchanges of Batcher's merge sort of so many rows."""
-    return tuple(_merge_exchange(count))
-
-
-def _merge_exchange(count: int) -> Iterator[tuple[int, int]]:
-    first = 1 << max(count - 1, 0).bit_length() >> 1
-    step = first
-    while step:
-        wide, part, apart = first, 0, step
-        while True:
-            yield from ((row, row + apart) for row in range(count - apart) if row & step == part)
-            if wide == step:
-                break
-            apart, wide, part = wide - step, wide >> 1, step
-        step >>= 1
 
 
 _EVERY_PIXEL = 6

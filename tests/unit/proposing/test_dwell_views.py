@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from calib_core.errors import CalibrationError
 from calib_core.proposing import DwellView, ViewProgress, dwell_views
 from calib_core.proposing.appearance import Appearance, appearance_of, with_appearance
-from calib_core.proposing.dwell_views import averaged_over_dwell, is_upright, reflector_width_px
+from calib_core.proposing.dwell_views import averaged_over_dwell, reflector_width_px
 from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.still_images import frames_within, stack_median
 from tests.unit.proposing.drawn_dwells import CAMERA, DrawnDwell, DrawnFrames, placements_of
@@ -259,16 +259,6 @@ def test_a_click_beside_the_apex_is_carried_as_it_is(views):
     view = with_appearance([rough(views[1], LOOKED_AT.dwells[1].apex_px)], [look], LOOKED_AT, CAMERA)[0]
     wanted = np.array(LOOKED_AT.dwells[1].apex_px) + np.array([0.0, low_px * view.width_px])
     assert np.hypot(*(view.candidates[0].pixel_px - wanted)) < 1.5
-
-
-@pytest.mark.parametrize(("height", "upright"), [(10, False), (17, False), (30, True)])
-def test_what_is_three_times_as_tall_as_wide_is_upright(views, height, upright):
-    change = np.zeros((1, 100, 100), np.uint8)
-    change[:, 50 - height // 2 : 50 + height // 2, 45:55] = 240
-    seen = replace(views[0], change=change, width_px=10.0, factor=1.0)
-    assert is_upright(seen, np.array([50.0, 50.0])) is upright
-    assert is_upright(seen, np.array([10.0, 10.0])) is None
-    assert is_upright(replace(seen, change=change[:0]), np.array([50.0, 50.0])) is None
 
 
 def test_without_a_look_nothing_changes(views):

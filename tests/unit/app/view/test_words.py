@@ -286,7 +286,7 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("no-frames-in-placements", {"placements": 9, "first_s": -90.0, "last_s": -12.0}),
     *(
         Unsolvable("not-confident", {"why": why, "placements": 4})
-        for why in ("few-placements", "no-mounting", "no-apex")
+        for why in ("few-placements", "no-mounting", "fading")
     ),
     *(Unsolvable("not-confident", {"why": why, **_SCORES, "confidence": 0.41}) for why in ("chance", "rival")),
     Unsolvable("not-confident", {"why": "few-certain", "certain": 4, "placements": 9, "needed": 6}),
