@@ -3,7 +3,7 @@
 A click can be averaged over its dwell: the apex that each of a few frames shows where the click means it.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -153,8 +153,13 @@ def _median_view(number: int, placements: Sequence[Placement], frames: FrameSour
 def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
     """Find what differs from the other dwells nearest in time."""
     view = views[number]
-    stills = [still for other in views for still in other.stills if still.image.shape == view.image.shape]
-    others = nearest_others(number, view.image_time, stills)
+    others = [
+        still
+        for other in views
+        for still in other.stills
+        if still.image.shape == view.image.shape and number not in still.standing
+    ]
+    others = sorted(others, key=lambda still: abs(still.time - view.image_time))[:_OTHERS]
     if not view.stills or len(others) < _LEAST_OTHERS:
         return view
     at_once = frozenset().union(*(still.standing for still in view.stills)) - {number}
@@ -255,9 +260,8 @@ def _without_images(view: DwellView) -> DwellView:
     return replace(view, image=view.image[:0], stills=()) if view.stills else view
 
 
-_OTHERS = 9
-_LEAST_OTHERS = 2
-"""Other still images that are needed to say what changed."""
+_LEAST_OTHERS, _OTHERS = 2, 9
+"""Other still images that are needed to say what changed, and how many are compared, those nearest in time."""
 _LEVELS_PER_GREY = 64.0
 _FLOOR_GREY = 3.0
 """Scatter of a pixel at least: compression and sensor."""
@@ -274,25 +278,14 @@ _SURROUNDINGS = 4.0
 """How much of the image around a place its width is judged by, in widths."""
 _RING = 1.2
 """Weight of the mean around the square: what is larger than a reflector, such as a person, cancels."""
+_PART, _PART_COUNTS = 0.6, 0.8
+"""Width of a part of the reflector that is looked for as well, and how much it counts."""
 _NEXT = 1.2
 """How far on both sides of a place a limb goes on, in widths of the reflector."""
 _BODY = (1.6, 3.0)
 """Width and height of what is taken for a body below a head, in widths of the reflector."""
 _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
-
-
-def nearest_others(number: int, time: TimeNs, stills: Iterable[StillImage]) -> list[StillImage]:
-    """Return the still images nearest in time in which a placement did not stand; at most nine.
-
-    Args:
-        number: of the placement.
-        time: in its middle.
-        stills: of all placements.
-    """
-    others = [still for still in stills if number not in still.standing]
-    others.sort(key=lambda still: abs(still.time - time))
-    return others[:_OTHERS]
 
 
 def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.ndarray:
@@ -305,9 +298,9 @@ def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.nd
         without: (l, h, w) of those without it.
         width_px: of the reflector in these images.
     """
-    response: np.ndarray = np.min([_stands_out(one, width_px) for one in change], axis=0)
+    response: np.ndarray = np.min([_of_size(one, width_px) for one in change], axis=0)
     for one in without:
-        response -= np.maximum(_stands_out(one, width_px), np.float32(0.0))
+        response -= np.maximum(_of_size(one, width_px), np.float32(0.0))
     return response
 
 
@@ -357,11 +350,17 @@ class _Usual:
         return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", off, off)))
 
 
+def _of_size(change: np.ndarray, width_px: float) -> np.ndarray:
+    """Return how far a place of about one size stands out [sigmas]; part of the reflector may look like what is behind it."""
+    change = change.astype(np.float32) * np.float32(1.0 / _LEVELS_PER_SIGMA)
+    whole, part = (_stands_out(change, share * width_px) for share in (1.0, _PART))
+    return np.maximum(whole, np.float32(_PART_COUNTS) * part)
+
+
 def _stands_out(change: np.ndarray, width_px: float) -> np.ndarray:
-    """Return the mean change in a square of one size, less that around it [sigmas]."""
+    """Return the mean change in a square of one size, less that around it."""
     import cv2
 
-    change = change.astype(np.float32) * np.float32(1.0 / _LEVELS_PER_SIGMA)
     side = max(3, 2 * round(0.5 * width_px) + 1)
     inner = cv2.blur(change, (side, side))
     wide = 2 * side + 1
