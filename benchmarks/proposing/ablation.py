@@ -1,8 +1,8 @@
 """What a part of proposing is worth: `python -m benchmarks.proposing.ablation` leaves out one at a time.
 
 Simulated recordings of ten placements have one reflector or two; decoys are those of `benchmarks.proposing.decoys`, and
-`--real FOLDER` adds the public set of two boards, clicked once at each in turn. Right is within 3 px, or 0.3 m on the boards;
-wrong is what is not on the reflector.
+`--real FOLDER` adds the public set of two boards, clicked at one board of each scene in turn. Right is within 3 px, or 0.3 m on
+the boards; wrong is what is not on the reflector.
 """
 
 import argparse
@@ -174,7 +174,7 @@ def _count_boards(
         return [len(set(right) - {"", clicked}), right.count("")]
 
     after, sure = [], [one for one in ranked if one.confidence > _SURE]
-    for click in clicks:
+    for click in clicks[::2]:
         _, again = proposed_again(views, frames, camera, CalibrationOptions(), confirmed=(click,))
         after.append(counted(again.ranked, click.id))
         sure += [one for one in again.ranked if one.confidence > _SURE]
@@ -190,35 +190,39 @@ def main() -> None:
     parser.add_argument("--decoys", type=int, default=0, help="recordings of each kind of decoy")
     parser.add_argument("--real", type=Path, help="folder of the checkouts of public sets")
     parser.add_argument("--parts", nargs="+", choices=_PARTS, default=list(_PARTS), metavar="PART", help="these only")
+    parser.add_argument("--together", action="store_true", help="leave them all out at once")
     given = parser.parse_args()
     with TemporaryDirectory() as scratch:
         subjects = list(_subjects(given, Path(scratch)))
-        _print_table(given.parts, subjects)
+        _print_table([given.parts] if given.together else [[part] for part in given.parts], subjects)
 
 
-def _print_table(parts: Sequence[str], subjects: Sequence[_Subject]) -> None:
+def _print_table(rows: Sequence[Sequence[str]], subjects: Sequence[_Subject]) -> None:
     kinds = list(dict.fromkeys(one.kind for one in subjects))
     plain = [dwell_views(one.placements, one.frames, one.camera) for one in subjects]
     when = [name for kind in kinds for name in ([kind] if kind == "decoys" else [kind, "after a click"])]
     print("| without | " + " | ".join([*when, "surer than 0.9"]) + " |")
     print("|---" * (len(when) + 2) + "|", flush=True)
-    for part in parts:
-        totals = _without(part, subjects, plain)
+    for parts in rows:
+        totals = _without(parts, subjects, plain)
         cells = [totals[kind][row] for kind in kinds for row in range(1 if kind == "decoys" else 2)]
         sure, wrong = sum(totals[kind][2] for kind in kinds)
-        rows = [*(f"{right:.0f} / {wrong:.0f}" for right, wrong in cells), f"{sure - wrong:.0f} / {wrong:.0f}"]
-        print(f"| {part} | " + " | ".join(rows) + " |", flush=True)
+        counts = [*(f"{right:.0f} / {wrong:.0f}" for right, wrong in cells), f"{sure - wrong:.0f} / {wrong:.0f}"]
+        print(f"| {', '.join(parts)} | " + " | ".join(counts) + " |", flush=True)
 
 
-def _without(part: str, subjects: Sequence[_Subject], plain: Sequence[tuple[DwellView, ...]]) -> dict[str, np.ndarray]:
-    """Return the counts (3, 2) by kind; views are made anew if the part is one of the images."""
+def _without(
+    parts: Sequence[str], subjects: Sequence[_Subject], plain: Sequence[tuple[DwellView, ...]]
+) -> dict[str, np.ndarray]:
+    """Return the counts (3, 2) by kind; views are made anew if a part is one of the images."""
     totals: dict[str, np.ndarray] = {}
+    stand_ins = {name: instead for part in parts for name, instead in _PARTS[part].items()}
     with ExitStack() as stack:
-        for name, instead in _PARTS[part].items():
+        for name, instead in stand_ins.items():
             stack.enter_context(patch(_CORE + name, instead))
         for one, views in zip(subjects, plain, strict=True):
             own = views
-            if any(name.startswith(_OF_IMAGES) for name in _PARTS[part]):
+            if any(name.startswith(_OF_IMAGES) for name in stand_ins):
                 own = dwell_views(one.placements, one.frames, one.camera)
             found = _proposed(one, own)
             totals[one.kind] = totals.get(one.kind, 0) + one.count(own, found)
