@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.arrays import Points3, Vector3
+from calib_core.arrays import Points2, Points3, Vector2, Vector3
 from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rendering.surfaces import Solid, block
@@ -110,6 +110,21 @@ def _hidden(
     way = points_m - eye_m
     distance = np.linalg.norm(way, axis=1)
     origin, rays = eye_m.astype(np.float32), (way / distance[:, None]).astype(np.float32)
-    for solid in solids:
+    for solid in _between(eye_m[:2], points_m[:, :2], solids):
         hidden |= solid.crossing(origin, rays)[0] < distance - 0.05
     return hidden
+
+
+def _between(eye_m: Vector2, points_m: Points2, solids: list[Solid]) -> list[Solid]:
+    """Return the solids that may be between an eye and points (n, 2), as seen from above: a few of many."""
+    if not len(points_m):
+        return []
+    low, high = (
+        np.array([side[:2] for side in sides]) for sides in zip(*((s.low_m, s.high_m) for s in solids), strict=True)
+    )
+    end = points_m.mean(axis=0) - eye_m
+    to_middle = 0.5 * (low + high) - eye_m
+    share = np.clip(to_middle @ end / max(end @ end, 1e-9), 0.0, 1.0)
+    apart_m = np.linalg.norm(to_middle - share[:, None] * end, axis=1)
+    reach_m = 0.5 * np.linalg.norm(high - low, axis=1) + np.linalg.norm(points_m - eye_m - end, axis=1).max()
+    return [solids[i] for i in np.flatnonzero(apart_m <= reach_m + 0.01)]

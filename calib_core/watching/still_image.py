@@ -31,6 +31,7 @@ _TILE_PX = 60.0
 _FEWEST_TILES = 6
 _ROUNDS = 4
 _FLOOR_RAD = np.deg2rad(0.005)
+_CONVERGED_RAD = 0.01 * _FLOOR_RAD
 _AHEAD = 0.1  # least z of a ray of unit length that a homography can hold
 
 
@@ -81,11 +82,12 @@ def camera_turn(before: np.ndarray, after: np.ndarray, camera: Camera) -> Turn |
     mask = cv2.findHomography(*plane, cv2.RANSAC, alike_rad)[1]
     if mask is None:
         return None
-    alike = mask.ravel() > 0
+    alike, rotation = mask.ravel() > 0, np.zeros(3)
     for _ in range(_ROUNDS):  # a homography bends more than a rotation does, so that decides in the end
         if len(np.unique(tiles[alike])) < _FEWEST_TILES:
             return None
-        rotation, covariance = _rotation(start[alike], end[alike], np.unique(tiles[alike], return_inverse=True)[1])
+        own = np.unique(tiles[alike], return_inverse=True)[1]
+        rotation, covariance = _rotation(rotation, start[alike], end[alike], own)
         alike = np.linalg.norm(end - start @ rotation_exp(rotation).T, axis=1) < alike_rad
     share = len(np.unique(tiles[alike])) / len(np.unique(tiles))
     return Turn(rotation, covariance) if share >= LEAST_SHARE else None
@@ -122,10 +124,8 @@ def _followed(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.nda
     return corners.reshape(-1, 2)[kept].astype(np.float64), there.reshape(-1, 2)[kept].astype(np.float64)
 
 
-def _rotation(start: np.ndarray, end: np.ndarray, tiles: np.ndarray) -> tuple[Vector3, Matrix33]:
-    """Fit a rotation to unit rays (n, 3) by iterated least squares with Tukey's weights; its covariance comes from the tiles."""
-    rotation = np.zeros(3)
-    weights = np.ones(len(start))
+def _rotation(rotation: Vector3, start: np.ndarray, end: np.ndarray, tiles: np.ndarray) -> tuple[Vector3, Matrix33]:
+    """Fit a rotation to unit rays (n, 3), from a first one, with Tukey's weights; its covariance comes from the tiles."""
     for _ in range(10):
         turned = start @ rotation_exp(rotation).T
         residuals = end - turned
@@ -138,6 +138,8 @@ def _rotation(start: np.ndarray, end: np.ndarray, tiles: np.ndarray) -> tuple[Ve
         normal = np.einsum("n,nki,nkj->ij", weights, jacobian, jacobian)
         step = np.linalg.solve(normal, np.einsum("n,nki,nk->i", weights, jacobian, residuals))
         rotation = rotation_log(rotation_exp(step) @ rotation_exp(rotation))
+        if float(np.abs(step).max()) < _CONVERGED_RAD:
+            break
     gradients = np.einsum("n,nki,nk->ni", weights, jacobian, residuals)
     count = int(tiles.max()) + 1
     of_tile = np.stack([np.bincount(tiles, axis, minlength=count) for axis in gradients.T], axis=1)

@@ -253,10 +253,10 @@ _CHANGE_PRIOR_RAD = np.deg2rad(20.0)
 _CLOCK_CHANGE_PRIOR_S = 0.01
 _OWN = 4  # unknowns of the baseline beside one for each class
 _FEWEST_TO_LEARN = 6
-_MISFIT, _MISFIT_RAD = 4.0, np.deg2rad(3.0)
+_ROUNDS, _USUAL_SIGMAS = 3, 2.0
 _UNKNOWN_CLASS = 4.0  # times the largest variance of a class that the baseline has
 _MOST_OF_A_PASSAGE = 8.0
-_USUAL_PASSAGE, _USUAL_PASSAGES = 0.5, 3.0
+_USUAL_PASSAGE, _USUAL_PASSAGES = 0.5, 2.0
 """What is expected of the variance of passages before any is seen, and with the weight of how many."""
 
 
@@ -320,27 +320,24 @@ class TrafficModel(Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("factors and information must be positive; write the baseline again from its recording")
 
     def turn(self, rows: TrafficRows) -> TurnFromTraffic | None:
-        """Return what rows say of a turn since the baseline; None if there are no rows that fit."""
+        """Return what rows say of a turn since the baseline; None without any."""
+        if not len(rows):
+            return None
         labels = (*self.labels, *sorted(set(rows.labels.tolist()) - set(self.labels)))
         classes = _classes(rows, labels)
         size = _OWN + len(labels)
-        known = np.zeros(size)
-        known[: len(self.middle)] = self.middle
         second, passage = _variances(np.array(self.factors).reshape(-1, 2, 2), rows, classes)
-        own = _design(rows, classes, len(labels))
-        misfit = np.abs(rows.residuals_rad - own @ known) / np.sqrt(second + passage + _MISFIT_RAD**2)
-        kept = np.flatnonzero(misfit < _MISFIT)
-        if not len(kept):
-            return None
-        rows, own = rows.some(kept), own[kept]
-        design = np.concatenate([own, rows.design], axis=1)
-        names, blocks, gradients = _by_passage(rows, design, second[kept], passage[kept])
+        design = np.concatenate([_design(rows, classes, len(labels)), rows.design], axis=1)
         before, towards = _prior(len(labels), change=True), np.zeros(size + _OWN)
         inner = slice(0, len(self.middle))
         before[inner, inner] += self.information
         towards[inner] += self.gradient
-        total, gradient = before + blocks.sum(axis=0), towards + gradients.sum(axis=0)
-        inverse = np.linalg.inv(total)
+        wider = np.ones(len(rows))
+        for _ in range(_ROUNDS):
+            names, blocks, gradients = _by_passage(rows, design, wider * second, wider * passage)
+            total, gradient = before + blocks.sum(axis=0), towards + gradients.sum(axis=0)
+            inverse = np.linalg.inv(total)
+            wider = _wider(rows.residuals_rad - design @ (inverse @ gradient), second + passage)
         change = slice(size, size + 3)
         rotation, covariance = (inverse @ gradient)[change], inverse[change, change]
         z = rotation / np.sqrt(np.diag(covariance))
@@ -377,13 +374,16 @@ def learned(rows: TrafficRows) -> TrafficModel:
     factors = np.ones((len(labels), 2, 2))
     passages = [len(np.unique(rows.passages[classes == one])) for one in range(len(labels))]
     span_s = float(np.ptp(rows.times_ns)) / NS_PER_S if len(rows) else 0.0
-    for _ in range(4):
+    wider = np.ones(len(rows))
+    for _ in range(6):
         second, passage = _variances(factors, rows, classes)
-        blocks, gradients = _by_passage(rows, design, second, passage)[1:]
+        blocks, gradients = _by_passage(rows, design, wider * second, wider * passage)[1:]
         information, gradient = blocks.sum(axis=0), gradients.sum(axis=0)
         middle = np.linalg.solve(information + prior, gradient)
         residuals = rows.residuals_rad - design @ middle
         usual = np.abs(residuals) < 5.0 * np.sqrt(second + passage)
+        wider = _wider(residuals, second + passage)
+        residuals = residuals / np.sqrt(wider)
         factors = np.array([
             [_factors(rows, residuals, base, np.flatnonzero(usual & (classes == one) & (rows.directions == way)))
              for way in (BEARING, ELEVATION)]
@@ -391,6 +391,11 @@ def learned(rows: TrafficRows) -> TrafficModel:
         ]).reshape(-1, 2, 2)  # fmt: skip
     statistics = (factors.tolist(), middle.tolist(), information.tolist(), gradient.tolist())
     return TrafficModel(labels, *statistics, passages, span_s)
+
+
+def _wider(residuals: Values, variances: Values) -> Values:
+    """Return by what variances (n,) are to be multiplied, so that what is far off counts less (Huber)."""
+    return np.maximum(np.abs(residuals) / np.sqrt(variances) / _USUAL_SIGMAS, 1.0)
 
 
 def _factors(rows: TrafficRows, residuals: Values, base: tuple[Values, Values], own: Indices) -> tuple[float, float]:
@@ -401,12 +406,12 @@ def _factors(rows: TrafficRows, residuals: Values, base: tuple[Values, Values], 
     which, counts = np.unique(rows.passages[own], return_inverse=True, return_counts=True)[1:]
     means = np.bincount(which, residuals[own]) / counts
     within = ((residuals[own] - means[which]) ** 2 / second).sum()
-    of_second = max(float(within) / max(len(own) - len(counts), 1), 0.05)
+    of_second = max(float(within) / max(len(own) - len(counts), 1), 0.02)
     noise = of_second * np.bincount(which, second) / counts**2
     excess = (means**2 - noise) / (np.bincount(which, passage) / counts)
     weights = np.minimum(counts, _MOST_OF_A_PASSAGE) / _MOST_OF_A_PASSAGE
     usual = _USUAL_PASSAGE * _USUAL_PASSAGES
-    return of_second, float((weights @ np.maximum(excess, 0.0) + usual) / (weights.sum() + _USUAL_PASSAGES))
+    return of_second, (max(float(weights @ excess), 0.0) + usual) / (float(weights.sum()) + _USUAL_PASSAGES)
 
 
 def _classes(rows: TrafficRows, labels: Sequence[str]) -> Indices:

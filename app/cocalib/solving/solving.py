@@ -123,6 +123,7 @@ def solve_in_steps(
 _greys: WeakKeyDictionary[Recording, dict[int, np.ndarray | None]] = WeakKeyDictionary()
 _turns: WeakKeyDictionary[Recording, dict[tuple[int, int], Turn | None]] = WeakKeyDictionary()
 """What was decoded and registered before: on the page, a click brings one image."""
+_NO_TURN = Turn(np.zeros(3), np.zeros((3, 3)))
 
 
 def camera_turned_warnings(
@@ -150,7 +151,7 @@ def _turns_since_the_first(recording: Recording, times: TimesNs, camera: Camera)
     for time, grey in frames.items():
         key = indices[first], indices[time]
         if key not in known:
-            known[key] = camera_turn(frames[first], grey, camera)
+            known[key] = camera_turn(frames[first], grey, camera) if time != first else _NO_TURN
         found[time] = known[key]
     return found
 
