@@ -1,5 +1,6 @@
 """Serve a session of a recording in this process."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +10,9 @@ from calib_core.camera import Camera
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Reference, Workspace, open_workspace
+
+OWN_PORT = 21_000 + 100 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+"""The first port to try for a page that opens sooner at an address whose files the browser has."""
 
 
 @contextmanager

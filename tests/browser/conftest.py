@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Playwright, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Playwright, expect, sync_playwright
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import RadarScans
@@ -14,12 +16,13 @@ from calib_core.options import GatingOptions
 from calib_core.recordings import Recording, open_recording
 from cocalib.web.channel import hub
 from cocalib.web.channel.radar_survey import Survey, survey_of
+from cocalib.web.port import routes
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import FLAGS, PATIENCE_S, Driver
 from tests.find_browser import find_browser
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 expect.set_options(timeout=PATIENCE_S * 1000)
 
@@ -59,6 +62,35 @@ def launch(playwright_driver: Playwright, browser_path: Path) -> Iterator[Callab
 @pytest.fixture(scope="package")
 def chromium(launch: Callable[..., Browser]) -> Browser:
     return launch()
+
+
+def new_window(browser: Browser, *, without_3d_view: bool, script: str = "", **options: Any) -> BrowserContext:
+    """Open a window with its own cookies, settings and files; the script runs first on each of its pages."""
+    window = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **options})
+    for first in filter(None, (script, EMPTY_3D_VIEW if without_3d_view else "")):
+        window.add_init_script(first)
+    return window
+
+
+@pytest.fixture(scope="package")
+def shared_window(chromium: Browser) -> Callable[[bool], BrowserContext]:
+    """Return the window of ordinary pages, without or with the 3D view; it has the page's files from the second time on."""
+    return cache(lambda without_3d_view: new_window(chromium, without_3d_view=without_3d_view))
+
+
+@pytest.fixture(scope="package", autouse=True)
+def files_may_be_kept() -> Iterator[None]:
+    """Let browsers keep the files of the page, whose server has the same port in each test where it can."""
+    patch, answer = pytest.MonkeyPatch(), routes._file
+
+    def kept(*arguments: Any, **options: Any) -> routes.Reply:
+        reply = answer(*arguments, **options)
+        headers = {**dict(reply.headers), "Cache-Control": "max-age=3600"}
+        return replace(reply, headers=tuple(headers.items()))
+
+    patch.setattr(routes, "_file", kept)
+    yield
+    patch.undo()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -110,7 +142,7 @@ def server(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[RunningServer]:
     monkeypatch.setattr(hub, "survey_of", survey_of_sample)
-    running = start(workspace, sample, ServerOptions(port=0, token="test"))
+    running = start(workspace, sample, ServerOptions(port=OWN_PORT, token="test"))
     yield running
     running.close()
 
@@ -128,42 +160,47 @@ def radar_only_server(project_root: Path, tmp_path: Path) -> Iterator[RunningSer
 
 
 @pytest.fixture
-def open_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Callable[..., Driver]]:
+def open_page(
+    chromium: Browser, shared_window: Callable[[bool], BrowserContext], request: pytest.FixtureRequest
+) -> Iterator[Callable[..., Driver]]:
     """Open pages; at the end, check that none logged an error or contacted another machine.
 
-    Those marked no_3d_view have an empty frame in the place of the 3D view, whose loading costs two seconds.
+    Those marked no_3d_view have an empty frame in the place of the 3D view, whose loading costs two seconds. The first page
+    of a test that asks for nothing else shares its window with those of other tests, without their cookies and settings.
     """
     without_3d_view = request.node.get_closest_marker("no_3d_view") is not None
     drivers: list[Driver] = []
-    contexts = []
+    windows: list[BrowserContext] = []
+    shared = shared_window(without_3d_view)
 
     def open_one(
         url: str,
         browser: Browser | None = None,
         ready: str = "__cocalib.state.shown",
-        script: str = "",
-        **context_options: Any,
+        **window_options: Any,
     ) -> Driver:
-        context = (browser or chromium).new_context(**{"viewport": {"width": 1280, "height": 720}, **context_options})
-        contexts.append(context)
-        if script:
-            context.add_init_script(script)
-        if without_3d_view:
-            context.add_init_script(EMPTY_3D_VIEW)
-        drivers.append(Driver(context.new_page(), url, ready))
+        if browser or window_options or drivers:
+            windows.append(new_window(browser or chromium, without_3d_view=without_3d_view, **window_options))
+            page = windows[-1].new_page()
+        else:
+            page = shared.new_page()
+            origin = {"origin": url.partition("/?")[0], "storageTypes": "local_storage"}
+            shared.new_cdp_session(page).send("Storage.clearDataForOrigin", origin)
+        drivers.append(Driver(page, url, ready))
         return drivers[-1]
 
     yield open_one
-    for driver in drivers:
-        assert driver.complaints == []
-        strangers = [
-            url
-            for url in driver.addresses
-            if not url.startswith(("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:"))
-        ]
-        assert strangers == []
-    for context in contexts:
-        context.close()
+    try:
+        for driver in drivers:
+            assert driver.complaints == []
+            assert driver.strangers == []
+    finally:
+        for page in shared.pages:
+            page.close()
+        shared.clear_cookies()
+        shared.clear_permissions()
+        for window in windows:
+            window.close()
 
 
 @pytest.fixture

@@ -54,6 +54,12 @@ class Driver:
         if message.type == "error":
             self.complaints.append(message.text)
 
+    @property
+    def strangers(self) -> list[str]:
+        """Addresses on other machines that the page asked for."""
+        own = ("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:")
+        return [url for url in self.addresses if not url.startswith(own)]
+
     def forget_lost_connections(self) -> None:
         """Drop the browser's own complaints about a server that was down, still opening, or did not know the page yet."""
         expected = ("WebSocket connection", "ERR_CONNECTION_REFUSED", "status of 401", "status of 503")

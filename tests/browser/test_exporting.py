@@ -16,7 +16,7 @@ from calib_core.interchange.formats.registry import FORMATS, format_named
 from calib_core.interchange.importing import read_any, read_any_file
 from calib_core.recordings import Recording
 from tests.browser.driving import Driver
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#page-deliver"
@@ -27,7 +27,7 @@ RECTIFIED = f"{DIALOG} .rectified:not(.returns):not(.despite) input"
 def solved_sample(sample: Recording, project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Serve the sample with its clicks, which no test of the panel changes; return the link."""
     folder = tmp_path_factory.mktemp("solved")
-    with serving(sample, folder / "session", camera=sample.camera(), name="sample", token="test") as (
+    with serving(sample, folder / "session", camera=sample.camera(), name="sample", port=OWN_PORT, token="test") as (
         running,
         workspace,
     ):

@@ -11,6 +11,7 @@ from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import Driver
 from tests.growing_recording import SampleWriter
+from tests.serving import OWN_PORT
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -67,7 +68,7 @@ def workspace(followed: FollowedRecording, tmp_path: Path) -> Iterator[Workspace
 
 @pytest.fixture
 def server(workspace: Workspace, followed: FollowedRecording) -> Iterator[RunningServer]:
-    running = start(workspace, followed, ServerOptions(port=0, token="test"))
+    running = start(workspace, followed, ServerOptions(port=OWN_PORT, token="test"))
     yield running
     running.close()
 

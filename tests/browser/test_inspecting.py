@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.recordings import RecordingOptions, open_recording
 from tests.browser.driving import Driver
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 from tests.vendor_recording import vendor_sample
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -23,7 +23,7 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
     options = RecordingOptions(clock="receive", radar_axes="forward,left,up")
     with open_recording([cut, folder / "camera.bag"], options) as recording:
         camera = recording.camera()
-        with serving(recording, tmp_path / "s", camera=camera, name="cut", token="test") as (running, _):
+        with serving(recording, tmp_path / "s", camera=camera, name="cut", port=OWN_PORT, token="test") as (running, _):
             page = open_page(running.url)
             assert page.text("#recording-topics") == "receive time: radar, camera"
             page.page.click("#choose-recording")
@@ -41,7 +41,10 @@ def test_assumptions_are_listed_until_the_user_confirms_them(
 ) -> None:
     with (
         open_recording(vendor_sample(project_root / "sample_data" / "rooftop", tmp_path)) as recording,
-        serving(recording, tmp_path / "s", camera=recording.camera(), token="test") as (running, workspace),
+        serving(recording, tmp_path / "s", camera=recording.camera(), port=OWN_PORT, token="test") as (
+            running,
+            workspace,
+        ),
     ):
         page = open_page(running.url)
         assert page.page.get_attribute("#recording-notes", "class") == "asks"

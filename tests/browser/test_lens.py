@@ -23,7 +23,7 @@ from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -53,7 +53,7 @@ def waved(folder: Path, tmp_path: Path) -> Iterator[tuple[RunningServer, Workspa
     """Serve a recording without intrinsics in which a board is waved first."""
     with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
         assert recording.camera() is None
-        with serving(recording, tmp_path / "s", name="waved", token="test") as (running, workspace):
+        with serving(recording, tmp_path / "s", name="waved", port=OWN_PORT, token="test") as (running, workspace):
             yield running, workspace
 
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 from tests.image_recording import ImageRecording
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -25,7 +25,10 @@ def dots(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     for image, (u, v) in zip(images, DOTS, strict=True):
         image[v, u] = 255
     recording = ImageRecording(images)
-    with serving(recording, tmp_path_factory.mktemp("dots") / "s", name="dots", token="test") as (running, _):
+    with serving(recording, tmp_path_factory.mktemp("dots") / "s", name="dots", port=OWN_PORT, token="test") as (
+        running,
+        _,
+    ):
         yield running
 
 

@@ -17,10 +17,11 @@ from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service
 from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
+from tests.serving import OWN_PORT
 
 pytestmark = pytest.mark.browser
 
-OPTIONS = ServerOptions(port=0, token="test", no_browser=True)
+OPTIONS = ServerOptions(port=OWN_PORT, token="test", no_browser=True)
 OPENING = Opening("long.bag", "Opening long.bag (5.1 GB): reading its index and times…")
 
 

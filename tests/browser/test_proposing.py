@@ -20,7 +20,7 @@ from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -95,7 +95,7 @@ def images(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Itera
 
 @pytest.fixture
 def proposing(images: Images, workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
-    running = start(workspace, sample, ServerOptions(port=0, token="test", proposes=True))
+    running = start(workspace, sample, ServerOptions(port=OWN_PORT, token="test", proposes=True))
     yield running
     images.allowed.set()
     running.close()
@@ -383,7 +383,10 @@ def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_
 def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
     sample: Recording, tmp_path: Path, open_page: Callable[..., Driver]
 ) -> None:
-    with serving(sample, tmp_path / "session", name="sample", token="test", proposes=True) as (running, _):
+    with serving(sample, tmp_path / "session", name="sample", port=OWN_PORT, token="test", proposes=True) as (
+        running,
+        _,
+    ):
         page = open_page(running.url)
         page.until("__cocalib.state.proposals?.progress.problem")
         page.press("n")

@@ -12,7 +12,7 @@ import pytest
 from tests.browser.driving import Driver
 from tests.image_recording import ImageRecording, grey_images
 from tests.served_process import ServedProcess, served_process
-from tests.serving import serving
+from tests.serving import OWN_PORT, serving
 
 pytestmark = pytest.mark.browser
 
@@ -63,7 +63,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
 def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:
     hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
     recording = ImageRecording(grey_images(3), image_topic=hostile, radar_topic=f"radar{hostile}")
-    with serving(recording, tmp_path / "s", name=f"name{hostile}", token="test") as (running, _):
+    with serving(recording, tmp_path / "s", name=f"name{hostile}", port=OWN_PORT, token="test") as (running, _):
         page = open_page(running.url)
         page.click(100, 100)
         page.press("?")
@@ -82,7 +82,7 @@ def test_large_frames_play_at_half_size_and_stand_at_full_size(
     open_page: Callable[..., Driver], tmp_path: Path
 ) -> None:
     recording = ImageRecording(grey_images(30, 2400, 1200))
-    with serving(recording, tmp_path / "s", name="large", token="test") as (running, _):
+    with serving(recording, tmp_path / "s", name="large", port=OWN_PORT, token="test") as (running, _):
         page = open_page(running.url)
         assert page.value("__cocalib.state.shown.scale") == 1
         page.press(" ")

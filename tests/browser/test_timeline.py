@@ -13,6 +13,7 @@ from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.image_recording import START, ImageRecording, grey_images
+from tests.serving import OWN_PORT
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -31,7 +32,7 @@ def islands_page(open_page: Callable[..., Driver], tmp_path: Path) -> Iterator[D
     recording = ImageRecording(grey_images(len(times_s), 64, 48))
     recording.image_times = START + (times_s * NS_PER_S).astype(np.int64)
     workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="islands")
-    server: RunningServer = start(workspace, recording, ServerOptions(port=0, token="test"))
+    server: RunningServer = start(workspace, recording, ServerOptions(port=OWN_PORT, token="test"))
     page = open_page(server.url)
     page.until("__cocalib.state.placementsKnown")
     rows = [
