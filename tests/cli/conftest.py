@@ -1,10 +1,12 @@
 """Small recordings, either good or wrong in exactly one way."""
 
+import importlib
 import json
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -118,6 +120,27 @@ class Typed:
     code: int
     out: str
     err: str
+
+
+@pytest.fixture(scope="package", autouse=True)
+def parsers_are_kept() -> Iterator[None]:
+    """Let tyro describe each command's options once, as in a process of its own, and not for each command line again."""
+    kind = getattr(importlib.import_module("tyro._parsers"), "ParserSpecification", None)
+    made = getattr(kind, "from_callable_or_type", None)  # where a new tyro lacks it, commands take longer here
+    kept: dict[object, object] = {}
+
+    def kept_or_made(command: object, **context: Any) -> object:
+        if context.get("intern_prefix"):  # a group of options within a command
+            return made(command, **context)
+        if command not in kept:
+            kept[command] = made(command, **context)
+        return kept[command]
+
+    patch = pytest.MonkeyPatch()
+    if made is not None:
+        patch.setattr(kind, "from_callable_or_type", staticmethod(kept_or_made))
+    yield
+    patch.undo()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -19,10 +19,9 @@ import cv2
 import numpy as np
 import pytest
 
-from cocalib.cli import run, usage
-from cocalib.cli.commands import COMMANDS, Command
+from cocalib.cli import run
+from cocalib.cli.commands import COMMANDS
 from cocalib.cli.flags import OUTPUT, OUTPUT_FOLDER
-from cocalib.cli.usage import read_command
 from cocalib.platform import files
 from tests.cli.test_session import FACTS
 from tests.cli.test_simulate import TINY
@@ -68,17 +67,6 @@ _STREAMED = {"export.out, maps", "export.out, mcap", "show.out", "show.out, over
 _EXTRA = {"show.out": "av", "show.out, overlay": "av", "show.out, rrd": "rerun"}
 
 
-_read: dict[tuple[str, ...], object] = {}
-
-
-def _read_once(command: Command, arguments: Sequence[str]) -> Any:
-    """Parse each command line once: that takes longer than refusing it."""
-    typed = (command.name, *arguments)
-    if typed not in _read:
-        _read[typed] = read_command(command, arguments)
-    return _read[typed]
-
-
 @pytest.fixture(scope="module")
 def files_of_commands(solved_folder: Path, project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files that the commands read."""
@@ -111,7 +99,6 @@ def here(files_of_commands: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(files, "_PATIENCE_S", 0.0)
-    monkeypatch.setattr(usage, "read_command", _read_once)
     return folder
 
 
