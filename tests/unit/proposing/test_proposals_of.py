@@ -22,6 +22,7 @@ from calib_core.proposing import (
     Proposal,
     Proposals,
     automatic_clicks,
+    chance,
     proposals_of,
 )
 from calib_core.proposing.chance import OTHER_WIDTHS, Chance, chance_of
@@ -30,6 +31,13 @@ from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_images_of
 
 OPTIONS = CalibrationOptions()
+
+
+@pytest.fixture(autouse=True)
+def fewer_deals(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compare fewer deals, which take most of the time; the slow tests of chance compare all."""
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr(chance, "_DEALS", 16)
 
 
 def proposed(drawn: DrawnViews, clicked: tuple[int, ...] = ()) -> Proposals:
@@ -392,6 +400,6 @@ def test_a_pose_is_no_farther_beyond_chance_than_it_explains_what_full_images_sh
 
 
 def test_the_spread_of_deals_is_wider_where_there_are_more_than_are_compared():
-    few, many = (Chance(1.0, 0.0, np.tile([-4.0, 4.0], count), is_clicked=False) for count in (10, 20))
+    few, many = (Chance(1.0, 0.0, np.tile([-4.0, 4.0], count), is_clicked=False) for count in (4, 8))
     assert few.bound == pytest.approx(16.0)
     assert many.bound == pytest.approx(1.1 * few.bound)
