@@ -1,6 +1,8 @@
 """Settings and fixtures for all tests."""
 
+import contextlib
 import gc
+import importlib
 import os
 import sys
 from pathlib import Path
@@ -39,6 +41,20 @@ gc.disable()
 def pytest_configure(config: pytest.Config) -> None:
     """Try fewer examples of each law where the slow tests are left out, too."""
     settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "all")
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """Load the tests from another file on in each worker, so that in a new checkout each compiles a part, and reads the rest."""
+    worker = getattr(session.config, "workerinput", None)
+    if worker is None or session.config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
+        return
+    ignored = tuple(session.config.getoption("ignore") or ())
+    files = [path.relative_to(ROOT) for path in sorted(ROOT.glob("tests/**/test_*.py"))]
+    names = [".".join(path.with_suffix("").parts) for path in files if not str(path).startswith(ignored)]
+    first = len(names) * int(worker["workerid"][2:]) // worker["workercount"]
+    for name in (*names[first:], *names[:first]):
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # is told where its file is collected
+            importlib.import_module(name)
 
 
 def pytest_collection_finish() -> None:

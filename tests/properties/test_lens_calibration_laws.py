@@ -25,7 +25,9 @@ def calibrated(
     return lens
 
 
-LENS = calibrated(VIEWS)
+@pytest.fixture(scope="module")
+def lens() -> CalibratedLens:
+    return calibrated(VIEWS)
 
 
 def same_lens(one: CalibratedLens, other: np.ndarray) -> None:
@@ -34,33 +36,33 @@ def same_lens(one: CalibratedLens, other: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.01, 3.0])
-def test_the_size_of_the_squares_changes_distances_and_nothing_else(factor):
+def test_the_size_of_the_squares_changes_distances_and_nothing_else(factor, lens):
     other = calibrated(VIEWS, square_m=factor * BOARD.square_m)
-    same_lens(other, LENS.camera.parameters)
-    for one, two in zip(LENS.views, other.views, strict=True):
+    same_lens(other, lens.camera.parameters)
+    for one, two in zip(lens.views, other.views, strict=True):
         np.testing.assert_allclose(
             two.camera_from_board.translation_m, factor * one.camera_from_board.translation_m, rtol=1e-4
         )
 
 
-def test_the_order_of_the_views_does_not_matter():
-    same_lens(calibrated(VIEWS[::-1]), LENS.camera.parameters)
+def test_the_order_of_the_views_does_not_matter(lens):
+    same_lens(calibrated(VIEWS[::-1]), lens.camera.parameters)
 
 
-def test_the_order_of_the_corners_does_not_matter():
+def test_the_order_of_the_corners_does_not_matter(lens):
     order = np.random.default_rng(0).permutation(54)
     mixed = tuple(replace(view, corner_ids=view.corner_ids[order], pixels_px=view.pixels_px[order]) for view in VIEWS)
-    same_lens(calibrated(mixed), LENS.camera.parameters)
+    same_lens(calibrated(mixed), lens.camera.parameters)
 
 
-def test_images_of_twice_the_size_have_twice_the_focal_length():
+def test_images_of_twice_the_size_have_twice_the_focal_length(lens):
     larger = tuple(replace(view, size_px=(2560, 1440), pixels_px=2.0 * view.pixels_px + 0.5) for view in VIEWS)
-    same_lens(calibrated(larger, size_px=(2560, 1440)), LENS.camera.scaled(2.0).parameters)
+    same_lens(calibrated(larger, size_px=(2560, 1440)), lens.camera.scaled(2.0).parameters)
 
 
-def test_mirroring_all_images_mirrors_the_principal_point():
+def test_mirroring_all_images_mirrors_the_principal_point(lens):
     mirrored = tuple(replace(view, pixels_px=view.pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0]) for view in VIEWS)
-    expected = LENS.camera.parameters.copy()
+    expected = lens.camera.parameters.copy()
     expected[2] = SIZE_PX[0] - 1.0 - expected[2]
     expected[7] *= -1.0  # p2, which belongs to x
     same_lens(calibrated(mirrored), expected)

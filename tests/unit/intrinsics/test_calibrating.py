@@ -199,7 +199,9 @@ def calibrated_over_the_image(model: str, count: int = 12, *, truth: str = "") -
     return lens
 
 
-LENS = calibrated_over_the_image("pinhole")
+@pytest.fixture(scope="module")
+def lens() -> CalibratedLens:
+    return calibrated_over_the_image("pinhole")
 
 
 def test_the_slopes_of_far_points_are_those_of_their_pixels():
@@ -216,34 +218,34 @@ def test_the_slopes_of_far_points_are_those_of_their_pixels():
         np.testing.assert_allclose(turn[:, :, axis], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-3)
 
 
-def test_the_projection_is_surest_where_corners_are_and_less_sure_at_the_edge():
-    grid = projection_uncertainty(LENS, columns=9, rows=7)
+def test_the_projection_is_surest_where_corners_are_and_less_sure_at_the_edge(lens):
+    grid = projection_uncertainty(lens, columns=9, rows=7)
     assert grid.sigma_px.shape == (7, 9)
     assert (grid.x_px[0], grid.x_px[-1], grid.y_px[-1]) == (0.0, SIZE_PX[0] - 1.0, SIZE_PX[1] - 1.0)
     assert grid.sigma_px.min() < 0.3 < 2.0 * np.median(grid.sigma_px) < 2.0 * grid.sigma_px.max()
 
 
-def test_a_shift_of_the_principal_point_that_a_rotation_undoes_is_nearly_no_uncertainty():
+def test_a_shift_of_the_principal_point_that_a_rotation_undoes_is_nearly_no_uncertainty(lens):
     matrix = np.zeros((4, 4))
     matrix[2, 2] = 100.0  # 10 px
-    camera = replace(LENS.camera, covariance=CameraCovariance(LENS.camera.parameter_names, matrix))
-    assert np.median(projection_uncertainty(replace(LENS, camera=camera)).sigma_px) < 2.0
+    camera = replace(lens.camera, covariance=CameraCovariance(lens.camera.parameter_names, matrix))
+    assert np.median(projection_uncertainty(replace(lens, camera=camera)).sigma_px) < 2.0
 
 
-def test_residuals_of_the_true_model_are_noise():
-    field = residual_field(LENS)
+def test_residuals_of_the_true_model_are_noise(lens):
+    field = residual_field(lens)
     assert not field.systematic
     assert abs(field.neighbour_correlation) < 0.15
     assert field.counts.sum() == 12 * 54
     assert not field.neighbours_alike
 
 
-def test_a_pattern_that_all_views_share_is_more_than_noise():
+def test_a_pattern_that_all_views_share_is_more_than_noise(lens):
     def off(view: LensView) -> LensView:
         across = np.sin(view.corners.pixels_px / 150.0)
         return replace(view, residuals_px=view.residuals_px + 0.1 * across)
 
-    field = residual_field(replace(LENS, views=tuple(off(view) for view in LENS.views)))
+    field = residual_field(replace(lens, views=tuple(off(view) for view in lens.views)))
     assert field.systematic
     assert field.systematic_px == pytest.approx(0.1, abs=0.03)
 
@@ -255,18 +257,18 @@ def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours():
     assert field.neighbours_alike
 
 
-def test_halves_of_the_views_agree_for_the_true_model():
-    agreeing = split_difference(LENS)
+def test_halves_of_the_views_agree_for_the_true_model(lens):
+    agreeing = split_difference(lens)
     assert not isinstance(agreeing, Unsolvable)
     assert agreeing.agrees
     assert agreeing.apart_px.shape == agreeing.expected_px.shape == (10, 16)
 
 
-def test_seven_views_are_not_split():
-    answer = split_difference(replace(LENS, views=LENS.views[:7]))
+def test_seven_views_are_not_split(lens):
+    answer = split_difference(replace(lens, views=lens.views[:7]))
     assert answer == Unsolvable("few-views", {"views": 7, "needed": 8, "halves": True})
 
 
 @pytest.mark.parametrize("columns", [2, 5])
-def test_grids_have_the_wanted_size(columns):
-    assert residual_field(LENS, columns=columns, rows=3).means_px.shape == (3, columns, 2)
+def test_grids_have_the_wanted_size(columns, lens):
+    assert residual_field(lens, columns=columns, rows=3).means_px.shape == (3, columns, 2)
