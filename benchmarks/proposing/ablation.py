@@ -68,7 +68,6 @@ _PARTS: dict[str, dict[str, Any]] = {
     "confidence that is tempered": {"proposing._TEMPER": 1.0},
     "places that others take": {"proposing._taken_by_others": lambda _, rays, __: rays.odds < 0.0},
     "people told by their echo": {"proposing.reflector_log_odds": lambda *_, **__: np.inf},
-    "poses that clicks leave open": {"proposing.clicks_agreement": lambda rays, _: 0.0 * rays.at_first().odds},
     "the width of what was clicked": {"appearance.width_seen_px": lambda view, _: view.width_px},
     "a look finer than a pixel": {"appearance._FINER": 1.0},
 }

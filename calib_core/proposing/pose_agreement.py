@@ -93,9 +93,6 @@ _LEAST_DWELLS = 2
 _OTHER_POSE_RAD = np.radians(2.5)
 """Mean angle between the predictions of two poses that differ clearly."""
 
-_CLICK_STEP = 2.0
-"""The same between the dwells that a click may be of."""
-
 _RIVAL_STEP = 4.0
 """How fast the probability of a pose changes with its score: slower than if dwells were independent."""
 
@@ -172,64 +169,6 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
         rival_share=0.0 if rival is None else _share(rays, _judged_by_others(rays, prior, _row(poses, rival))[0]),
         trials=rough.tried,
     )
-
-
-def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> Points2:
-    """Return the probability of each candidate (d, k) by the poses that clicks and mounting leave open.
-
-    Each click bounds rows and columns at every range.
-
-    A click may be of each dwell of its time, which gives as many poses; what the other dwells show weighs them.
-
-    Args:
-        rays: of all dwells, with at least one click.
-        prior: of the mounting.
-    """
-    is_click = rays.click >= 0
-    only = replace(rays, odds=np.where(is_click, rays.odds, 0.0))
-    only = replace(
-        only, missing=np.maximum(1.0 - rays.of_dwells(only.odds).sum(axis=1), ~is_click[rays.first].any(axis=1))
-    )
-    poses = _from_first_click(only, prior)
-    for _ in range(2 * _STEPS):
-        poses = _stepped(only, prior, poses)
-    poses, information = _with_nominal(poses, normal_equations(only, prior, poses)[0], prior)
-    seen = expectation(rays, poses)
-    left_open = np.einsum("mnkap,mpq,mnkbq->mnkab", seen.jacobian, np.linalg.inv(information), seen.jacobian)
-    gain = sum(densities(seen.off_rad, seen.covariance + left_open)) * rays.odds / rays.density
-    gain = rays.of_dwells(gain)
-    total = rays.missing + gain.sum(axis=-1)
-    off, precision = _prior_offsets(prior, poses)
-    scores = np.log(total).sum(axis=1) - 0.5 * (precision * off**2).sum(axis=1)
-    weight = np.exp((scores - scores.max()) / _CLICK_STEP)
-    weight /= weight.sum()
-    return np.asarray(np.einsum("m,mnk->nk", weight, gain / total[..., None]))
-
-
-def _with_nominal(poses: RoughPoses, information: np.ndarray, prior: MountingPrior) -> tuple[RoughPoses, np.ndarray]:
-    """Add the mounting itself, as far as it is known: the clicks may be of what the radar did not report."""
-    count = len(prior.starts_m)
-    _, precision = _prior_offsets(prior, poses)
-    return RoughPoses.of_rotations(
-        np.concatenate([poses.rotations, np.tile(prior.rotation, (count, 1, 1))]),
-        np.concatenate([poses.centres_radar_m, prior.starts_m]),
-        np.zeros(len(poses) + count),
-        0,
-    ), np.concatenate([information, np.tile(np.diag(precision), (count, 1, 1))])
-
-
-def _from_first_click(rays: CandidateRays, prior: MountingPrior) -> RoughPoses:
-    """Return the poses nearest to the mounting that turn a dwell of the first click onto it, for each of its dwells."""
-    from scipy.spatial.transform import Rotation
-
-    places, columns = np.nonzero(rays.click == rays.click[rays.click >= 0].min())
-    turns = [
-        Rotation.align_vectors(rays.rays[place, column], prior.rotation @ directions[place])[0].as_matrix()
-        for directions in (_directions(rays, centre) for centre in prior.starts_m)
-        for place, column in zip(places, columns, strict=True)
-    ]
-    centres = np.repeat(prior.starts_m, len(places), axis=0)
-    return RoughPoses.of_rotations(np.array(turns) @ prior.rotation, centres, np.zeros(len(centres)), 0)
 
 
 def _row(poses: RoughPoses, row: int) -> RoughPoses:

@@ -17,7 +17,6 @@ from calib_core.proposing.image_candidates import ImageCandidate
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     PoseAgreement,
-    clicks_agreement,
     pose_agreement,
     reflector_log_odds,
 )
@@ -77,14 +76,14 @@ def proposals_of(
     rays = candidate_rays(views, camera, options, confirmed=clicks)
     prior = mounting_prior(options, is_flat=rays.is_flat)
     agreement = pose_agreement(rays, prior)
-    by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
+    by_look = rays.of_dwells(rays.odds) if (rays.click >= 0).any() else None
     if chance is None:
         chance = chance_of(views, camera, options, confirmed=clicks)
     if chance is not None and agreement is not None:
         # deals are compared roughly: what full images do not repeat was chance
         chance = replace(chance, score=min(chance.score, agreement.score))
     rays = rays.at_first()
-    judged = _Judged.of(views, rays, agreement, by_clicks, chance)
+    judged = _Judged.of(views, rays, agreement, by_look, chance)
     covered, slips = _clicks_by_dwell(rays, judged, clicks, camera)
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
@@ -174,21 +173,21 @@ class _Judged:
         views: Sequence[DwellView],
         rays: CandidateRays,
         agreement: PoseAgreement | None,
-        by_clicks: Points2 | None,
+        by_look: Points2 | None,
         chance: Chance | None,
     ) -> "_Judged":
-        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
+        """Weigh the candidates by the pose of all dwells, as far as it is trusted, and by their likeness to what was clicked."""
         from scipy.special import expit
 
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None and chance is not None:
             trusted = agreement.pose_probability * chance.probability
-            if by_clicks is None:
+            if by_look is None:
                 reflectors = float(expit(reflector_log_odds(views, agreement)))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
-        if by_clicks is not None:
-            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks * _compared_with_click(views, rays)
+        if by_look is not None:
+            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_look * _compared_with_click(views, rays)
         probability = _tempered(probability)
         taken = _taken_by_others(views, rays, probability)
         sure = np.where(taken, 0.0, probability)

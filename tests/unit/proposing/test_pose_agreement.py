@@ -12,7 +12,6 @@ from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     PoseAgreement,
-    clicks_agreement,
     pose_agreement,
     rotation_consensus,
 )
@@ -64,30 +63,6 @@ def test_a_dwell_does_not_vouch_for_its_own_candidate():
     found = agreed(candidate_rays(views, drawn.camera, OPTIONS))
     assert found.probability[2, 0] < 0.1
     assert np.delete(found.probability[:, 0], 2).min() > 0.8
-
-
-def test_one_click_bounds_where_the_other_dwells_may_lie():
-    drawn = draw_views(9, Drawing(count=8, decoys=0, clutter=0, listed_share=1.0))
-    aside = [
-        replace(view.candidates[0], pixel_px=view.candidates[0].pixel_px + np.array([0.0, 250.0]))
-        for view in drawn.views
-    ]
-    views = [
-        replace(view, candidates=(view.candidates[0], wrong)) for view, wrong in zip(drawn.views, aside, strict=True)
-    ]
-    rays = candidate_rays(views, drawn.camera, OPTIONS, confirmed=[drawn.click(2)])
-    found = clicks_agreement(rays, mounting_prior(OPTIONS, is_flat=rays.is_flat))
-    others = np.delete(found, 2, axis=0)
-    assert others[:, 0].min() > 0.8
-    assert others[:, 1].max() < 0.1
-
-
-def test_a_click_on_what_the_radar_did_not_report_bounds_little():
-    drawn = draw_views(9, Drawing(count=8, decoys=0, clutter=0, listed_share=1.0))
-    click = drawn.click(2)
-    rays = candidate_rays(drawn.views, drawn.camera, OPTIONS, confirmed=[replace(click, u_px=click.u_px + 300.0)])
-    found = clicks_agreement(rays, mounting_prior(OPTIONS, is_flat=rays.is_flat))
-    assert np.delete(found, 2, axis=0).max(axis=1).min() > 0.5
 
 
 def test_what_repeats_itself_at_one_place_counts_less():
