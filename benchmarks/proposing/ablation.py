@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -39,7 +38,6 @@ from cocalib.proposing import find_proposals, proposed_again
 
 __all__ = ["main"]
 
-_RESPONSE = import_module("calib_core.proposing.dwell_views")._response
 _CORE = "calib_core.proposing."
 
 
@@ -54,9 +52,6 @@ _PARTS: dict[str, dict[str, Any]] = {
     "nothing": {},
     "limbs and bodies beside a place": {"dwell_views._of_a_larger_thing": lambda change, *_: np.zeros_like(change)},
     "a part of the reflector": {"dwell_views._PART_COUNTS": 0.0},
-    "changes without the placement": {
-        "dwell_views._response": lambda own, _, width_px: _RESPONSE(own, own[:0], width_px)
-    },
     "light that changes in parts": {"dwell_views.local_light": lambda image, _: np.ones_like(image[..., :1])},
     "a still for each set of placements": {"dwell_views.still_images": _one_still},
     "apexes of candidates": {"dwell_views.with_seen_apexes": lambda view, _: view},

@@ -50,7 +50,6 @@ class DwellView:
         width_px: of the reflector at that range, in the full image.
         clear: numbers of the few frames that are most like `image`: nobody walks past in them.
         change: (k, h, w) uint8, how far each pixel of the k stills lies from what the other dwells show there.
-        change_without: (l, h, w) uint8, the same of other dwells while those stood that stood meanwhile, but not this one.
     """
 
     placement: Placement
@@ -63,7 +62,6 @@ class DwellView:
     width_px: float = float("nan")
     clear: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     change: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
-    change_without: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
 
     def __post_init__(self) -> None:
         freeze(self, np.int64, frames=(None,), clear=(None,))
@@ -162,10 +160,8 @@ def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
     others = sorted(others, key=lambda still: abs(still.time - view.image_time))[:_OTHERS]
     if not view.stills or len(others) < _LEAST_OTHERS:
         return view
-    at_once = frozenset().union(*(still.standing for still in view.stills)) - {number}
-    without = [still for still in others if still.standing & at_once]
     usual = _Usual.of(view.stills[0].image, others)
-    return with_blobs(replace(view, change=usual.changes_of(view.stills), change_without=usual.changes_of(without)))
+    return with_blobs(replace(view, change=usual.changes_of(view.stills)))
 
 
 def with_blobs(view: DwellView, *, rough: bool = False) -> DwellView:
@@ -177,9 +173,8 @@ def with_blobs(view: DwellView, *, rough: bool = False) -> DwellView:
     """
     reduced = 1 << int(np.log2(max(view.width_px / view.factor / _ROUGH_PX, 1.0))) if rough else 1
     factor = view.factor * reduced
-    change, without = (_reduced(changes, reduced) for changes in (view.change, view.change_without))
     width_px = view.width_px / factor
-    response = _response(change, without, width_px)
+    response = _response(_reduced(view.change, reduced), width_px)
     found = blobs(response, width_px, most=_ROUGH_MOST) if rough else blobs(response, width_px)
     return replace(
         view,
@@ -236,7 +231,7 @@ def _shown_at(view: DwellView, middle: Indices, width_px: float) -> float:
     left, top = np.maximum(middle - wide, 0).tolist()
     right, bottom = (middle + wide + 1).tolist()
     part = np.s_[:, top:bottom, left:right]
-    response = _response(view.change[part], view.change_without[part], width_px)
+    response = _response(view.change[part], width_px)
     first = np.maximum(middle - reach - [left, top], 0)
     last = np.maximum(middle + reach + 1 - [left, top], first)
     return float(response[first[1] : last[1], first[0] : last[0]].max(initial=0.0))
@@ -288,20 +283,9 @@ _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
 
 
-def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.ndarray:
-    """Return how strongly each place changed at one size: (h, w) float32, in standard deviations.
-
-    Only what is in all images of the dwell counts, and what changed while it did not stand is not its own.
-
-    Args:
-        change: (k, h, w) of the dwell's images, at least one.
-        without: (l, h, w) of those without it.
-        width_px: of the reflector in these images.
-    """
-    response: np.ndarray = np.min([_of_size(one, width_px) for one in change], axis=0)
-    for one in without:
-        response -= np.maximum(_of_size(one, width_px), np.float32(0.0))
-    return response
+def _response(change: np.ndarray, width_px: float) -> np.ndarray:
+    """Return how strongly each place changed at one size, in all images (k, h, w) of a dwell: (h, w) float32 [sigmas]."""
+    return np.asarray(np.min([_of_size(one, width_px) for one in change], axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
