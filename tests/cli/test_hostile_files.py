@@ -112,7 +112,8 @@ def test_deep_nesting_is_refused(cocalib, solved, monkeypatch, name):
     monkeypatch.chdir(solved.parent)
     xml = '<?xml version="1.0"?><opencv_storage>{}</opencv_storage>'
     opening, closing = ("<a>", "</a>") if name.endswith("xml") else ("[", "]")
-    count = 1_200 if name.endswith("yaml") else 30_000  # YAML is split into words in Python, whose own limit is 1,000
+    few = 1_200 if name == "check.yaml" else 300  # YAML is split into words in Python, whose own limit is 1,000
+    count = few if name.endswith("yaml") else 30_000
     Path(name).write_text(NESTED.get(Path(name).suffix[1:], xml).format(opening * count + closing * count))
     assert re.search("deep|larger than 64 kB", one_line(cocalib(*(word.format(name) for word in PARSED[name]))))
 
