@@ -2,22 +2,25 @@
 
 python -m benchmarks.watch [traffic] [--seed 2000] [--count 39] [--seconds 900] [--keep FOLDER] [--processes 2]
 python -m benchmarks.watch image [--seed 2100] [--count 8] [--keep FOLDER]
+python -m benchmarks.watch returns [--seed 2300] [--count 6]
+python -m benchmarks.watch cost [--seed 2200] [--count 40]
 
 traffic: boxes as a detector would draw them, edges off by 1 px and 2 % in each frame and by 2 % for a whole track, one box in
-twenty missed, no tracks. image: rendered scenes in other light, with other cars, in rain. Recordings and scenes have one seed
-each, counted up from --seed. What is simulated or rendered is kept in --keep, which resumes a run.
+twenty missed, no tracks. image: rendered scenes in other light, with other cars, in rain. returns: a radar that turns. cost:
+processor time and memory over --count half minutes. Recordings and scenes have one seed each, counted up from --seed. What is
+simulated or rendered is kept in --keep, which resumes a run.
 """
 
 import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.watch import still_image, traffic
+from benchmarks.watch import cost, still_image, still_returns, traffic
 
 __all__ = ["main"]
 
-_SEEDS = {"traffic": 2000, "image": 2100}
-_COUNTS = {"traffic": 39, "image": 8}
+_SEEDS = {"traffic": 2000, "image": 2100, "returns": 2300, "cost": 2200}
+_COUNTS = {"traffic": 39, "image": 8, "returns": 6, "cost": 40}
 
 
 def main() -> int:
@@ -31,12 +34,13 @@ def main() -> int:
     parser.add_argument("--processes", type=int, default=2)
     given = parser.parse_args()
     seed, count = given.seed or _SEEDS[given.what], given.count or _COUNTS[given.what]
-    lines = (
-        traffic.report(seed, given.seconds, count, given.keep, given.processes)
-        if given.what == "traffic"
-        else still_image.report(seed, count, given.keep)
-    )
-    for line in lines:
+    lines = {
+        "traffic": lambda: traffic.report(seed, given.seconds, count, given.keep, given.processes),
+        "image": lambda: still_image.report(seed, count, given.keep),
+        "returns": lambda: still_returns.report(seed, count),
+        "cost": lambda: cost.report(seed, count),
+    }
+    for line in lines[given.what]():
         print(line, flush=True)
     return 0
 

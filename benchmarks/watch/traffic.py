@@ -35,6 +35,7 @@ KINDS = (
 TURNS = (("pitch", 0, 0.5), ("pitch", 0, 1.0), ("yaw", 1, 0.5), ("yaw", 1, 1.0), ("roll", 2, 2.0))
 SIZED = (("pitch", 0, 1.0), ("yaw", 1, 1.0))
 _AXES = ("pitch", "yaw", "roll")
+_FIRST_SEED = 2000  # of the first kind
 _PARTS = 3
 _WINDOWS_S = (6, 12, 24, 48)
 _SIGMAS = 5.0
@@ -152,7 +153,7 @@ class _Part:
 
 def report(seed: int, seconds: int, count: int, folder: Path | None, processes: int) -> Iterator[str]:
     """Yield what is found in a number of recordings, each with a seed of its own."""
-    kinds = [KINDS[number % len(KINDS)] for number in range(count)]
+    kinds = [KINDS[(number - _FIRST_SEED) % len(KINDS)] for number in range(seed, seed + count)]
     found: list[Judged] = []
     with ProcessPoolExecutor(processes) as pool:
         for one in pool.map(judged, kinds, range(seed, seed + count), [seconds] * count, [folder] * count):
@@ -174,6 +175,8 @@ def _interval_lines(found: Sequence[Judged]) -> Iterator[str]:
         own = [one for one in found if kind in (one.kind, "all")]
         for window in (*_WINDOWS_S, 0):
             z = np.concatenate([one.z[window] for one in own])
+            if not len(z):
+                continue
             cells = ", ".join(f"{value:.2f}" for value in np.sqrt((z**2).mean(axis=0)))
             yield f"| {kind} | {f'{window} s' if window else 'a third'} | {cells} | {len(z)} |"
     for number, (name, axis, turn_deg) in enumerate(SIZED):

@@ -17,6 +17,7 @@ _RADAR_WAYS: Final = (("counterclockwise", "clockwise"), ("up", "down"), ("right
 """How a radar did, about its x, y and z."""
 _RADAR_AXES: Final = ("roll", "pitch", "yaw")
 _NINETY_FIVE = 1.96
+_CLOCK_SIGMAS = 5.0
 _USUAL_RANGE_M = 10.0
 LEAST_TRAFFIC_S = 600.0
 """A baseline with less traffic is the largest error of a change."""
@@ -49,7 +50,7 @@ def verdict_lines(verdict: Verdict) -> Iterator[str]:
             continue
         where = " against the radar" if name == "traffic" else " in the world"
         of = f" ({seen.passages} passages)" if seen.passages else ""
-        for line in _turns(who, seen, ways, against=where, all_axes=True):
+        for line in (*_turns(who, seen, ways, against=where, all_axes=True), *_late(seen)):
             yield f"{name}{of}: {line}"
 
 
@@ -63,6 +64,15 @@ def _turns(
     if not named and all_axes:
         order = [1, 2, 0] if who == "radar" else [0, 1, 2]  # roll, pitch and yaw are about x, y and z of a radar
         yield f"no turn of the {who}{against} seen; {_noticed(seen.noticed_rad[order])}"
+
+
+def _late(seen: SeenTurn) -> Iterator[str]:
+    """Yield a change of the offset between the clocks, if traffic shows one."""
+    if seen.late_s is not None and abs(seen.late_s[0]) > _CLOCK_SIGMAS * seen.late_s[1]:
+        late, sigma = (1e3 * one for one in seen.late_s)
+        low, high = abs(late) - _NINETY_FIVE * sigma, abs(late) + _NINETY_FIVE * sigma
+        way = "later" if late > 0 else "earlier"
+        yield f"images are stamped {abs(late):.0f} ms {way} (95 %: {low:.0f} to {high:.0f}) against scans than in the baseline"
 
 
 def turn_text(who: str, seen: SeenTurn, axis: int, ways: tuple[str, str], *, against: str = "") -> str:
@@ -146,6 +156,7 @@ def _seen(seen: SeenTurn, axes: tuple[str, ...]) -> dict[str, object]:
         "would_have_been_noticed_deg": _by_axis(np.rad2deg(seen.noticed_rad), axes),
         "since_ns": None if seen.since is None else int(seen.since),
         "passages": seen.passages,
+        "images_late_s": None if seen.late_s is None else {"change": seen.late_s[0], "sigma": seen.late_s[1]},
     }
 
 

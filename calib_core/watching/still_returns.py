@@ -29,6 +29,7 @@ _SEARCHED_RAD = np.deg2rad(np.arange(-8.0, 8.01, 0.5))
 _FEWEST_RETURNS = 5
 _LEAST_SPREAD_RAD = np.deg2rad(0.1)  # of elevations, below which the radar measures none
 _FLOOR_RAD = np.deg2rad(0.03)
+_FEW_AZIMUTHS = 0.1  # different ones, as a share of the returns: a radar with bins
 _UNKNOWN_RAD = np.deg2rad(20.0)
 
 
@@ -102,7 +103,13 @@ def radar_turn(places: StillPlaces, scans: RadarScans) -> Turn | None:
         if len(kept) < _FEWEST_PLACES:
             return None
         turn = float(np.median(moved[kept, 0]))
-    return _turn(known[kept], moved[kept])
+    return _turn(known[kept], moved[kept], _step(polar))
+
+
+def _step(polar: Points3) -> float:
+    """Return the distance between the azimuths of a radar that reports bins [rad]; 0 for one that does not."""
+    sines = np.unique(np.round(np.sin(polar[:, 1]) * np.cos(polar[:, 2]), 3))
+    return float(np.median(np.diff(sines))) if 1 < len(sines) < _FEW_AZIMUTHS * len(polar) else 0.0
 
 
 def _still(scans: RadarScans) -> tuple[Points3, Indices, int]:
@@ -138,8 +145,8 @@ def _moved(places: np.ndarray, polar: Points3, turn: float, *, narrow: bool = Fa
     return moved, counts
 
 
-def _turn(places: np.ndarray, moved: np.ndarray) -> Turn:
-    """Fit a rotation of the radar to how far its places have moved; what scatters between places is the noise."""
+def _turn(places: np.ndarray, moved: np.ndarray, step_rad: float) -> Turn:
+    """Fit a rotation of the radar to how far its places have moved; what scatters between places, and bins, are the noise."""
     azimuth, elevation = places[:, 1], places[:, 2]
     none = np.zeros(len(places))
     flat = bool(np.median(places[:, 4]) < _LEAST_SPREAD_RAD)
@@ -148,9 +155,10 @@ def _turn(places: np.ndarray, moved: np.ndarray) -> Turn:
     by_elevation = np.stack([np.sin(azimuth), -np.cos(azimuth), none], axis=1)
     design, values = ([by_azimuth], [moved[:, 0]]) if flat else ([by_azimuth, by_elevation], [*moved.T])
     information, gradient = np.eye(3) / _UNKNOWN_RAD**2, np.zeros(3)
-    for rows, value in zip(design, values, strict=True):
+    floors = max(_FLOOR_RAD, step_rad / np.sqrt(12.0)), _FLOOR_RAD  # within a bin, a place does not move at all
+    for rows, value, floor in zip(design, values, floors, strict=False):
         off = value - np.median(value)
-        sigma = max(1.4826 * float(np.median(np.abs(off))), _FLOOR_RAD)
+        sigma = max(1.4826 * float(np.median(np.abs(off))), floor)
         weight = np.maximum(1.0 - (off / (4.685 * sigma)) ** 2, 0.0) ** 2 / (1.6 * sigma**2)
         information += rows.T @ (weight[:, None] * rows)
         gradient += rows.T @ (weight * value)

@@ -250,7 +250,7 @@ def _passage(frames: _Frames, row: int) -> int:
 _TURN_PRIOR_RAD, _CLOCK_PRIOR_S, _BODY_PRIOR = np.deg2rad(20.0), 0.3, 0.15
 """Of the baseline's pose, its clocks, and where on a body the radar sees it, as a share of the box's height."""
 _CHANGE_PRIOR_RAD = np.deg2rad(20.0)
-_CLOCK_CHANGE_PRIOR_S = 0.01
+_CLOCK_CHANGE_PRIOR_S = 0.1
 _OWN = 4  # unknowns of the baseline beside one for each class
 _FEWEST_TO_LEARN = 6
 _ROUNDS, _USUAL_SIGMAS = 3, 2.0
@@ -276,11 +276,13 @@ class TurnFromTraffic(Turn):
         least_z: (3,) smallest turn over its standard deviation about each axis, without whichever single passage; 0 if that
             changes the sign, or if there are fewer than three.
         worst_sigma_rad: (3,) largest standard deviation without whichever single passage; infinite if there are fewer than three.
+        late_s: by how much later the images are stamped against the scans than in the baseline, and its standard deviation.
     """
 
     passages: int
     least_z: Vector3
     worst_sigma_rad: Vector3
+    late_s: tuple[float, float]
 
     def __post_init__(self) -> None:
         Turn.__post_init__(self)
@@ -339,7 +341,9 @@ class TrafficModel(Struct, frozen=True, forbid_unknown_fields=True):
             inverse = np.linalg.inv(total)
             wider = _wider(rows.residuals_rad - design @ (inverse @ gradient), second + passage)
         change = slice(size, size + 3)
-        rotation, covariance = (inverse @ gradient)[change], inverse[change, change]
+        middle = inverse @ gradient
+        rotation, covariance = middle[change], inverse[change, change]
+        late_s = float(middle[size + 3]), float(np.sqrt(inverse[size + 3, size + 3]))
         z = rotation / np.sqrt(np.diag(covariance))
         least, worst = np.zeros(3), np.full(3, np.inf)
         if len(names) >= _FEWEST_PASSAGES:
@@ -348,7 +352,7 @@ class TrafficModel(Struct, frozen=True, forbid_unknown_fields=True):
             sigmas = np.sqrt(np.einsum("pii->pi", without)[:, change])
             least = np.clip((turns / sigmas * np.sign(z)).min(axis=0), 0.0, np.abs(z))
             worst = sigmas.max(axis=0)
-        return TurnFromTraffic(rotation, covariance, len(names), least, worst)
+        return TurnFromTraffic(rotation, covariance, len(names), least, worst, late_s)
 
 
 def _variances(factors: np.ndarray, rows: TrafficRows, classes: Indices) -> tuple[Values, Values]:

@@ -27,6 +27,8 @@ _KEPT_NS = 600 * NS_PER_S
 _STEP_NS = 2 * NS_PER_S
 _WINDOWS_NS = tuple(s * NS_PER_S for s in (6, 12, 24, 48))
 _TRAFFIC_SIGMAS = 5.0
+_CLOCK_KNOWN_S = 0.02
+"""Standard deviation of a change of the clocks' offset that is stated: traffic crosses in both directions."""
 _IMAGE_SIGMAS, _IMAGE_RAD = 4.0, np.deg2rad(0.03)
 _RETURNS_SIGMAS, _RETURNS_RAD = 5.0, np.deg2rad(0.2)
 _MOST_FRAMES = 160
@@ -269,7 +271,8 @@ class Watch:
         least = _TRAFFIC_SIGMAS * turn.worst_sigma_rad
         turned = np.array([one is not None for one in self._since])
         ranges = float(np.median(own.ranges_m))
-        return SeenTurn(turn.rotation_rad, turn.covariance_rad2, least, turned, since, ranges, turn.passages)
+        late_s = turn.late_s if turn.late_s[1] < _CLOCK_KNOWN_S else None
+        return SeenTurn(turn.rotation_rad, turn.covariance_rad2, least, turned, since, ranges, turn.passages, late_s)
 
 
 class _Turns:

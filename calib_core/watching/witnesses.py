@@ -57,6 +57,8 @@ class SeenTurn(Turn):
         since: the beginning of the first stretch or window that shows it; None if nothing turned.
         range_m: median range of what it is seen in; NaN if unknown.
         passages: of traffic that it rests on; 0 for other witnesses.
+        late_s: by how much later the images are stamped against the scans than in the baseline, and its standard deviation;
+            None where no traffic crosses.
     """
 
     least_rad: Vector3
@@ -64,6 +66,7 @@ class SeenTurn(Turn):
     since: TimeNs | None = None
     range_m: float = float("nan")
     passages: int = 0
+    late_s: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         Turn.__post_init__(self)

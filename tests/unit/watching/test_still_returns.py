@@ -1,5 +1,7 @@
 """Still returns say how a radar turned; what moves, and too few places, say nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,3 +66,22 @@ def test_without_enough_places_nothing_is_said():
     assert radar_turn(places, RadarScans()) is None
     assert radar_turn(still_places(RadarScans()), every) is None
     assert len(still_places(RadarScans())) == 0
+
+
+def test_a_radar_whose_azimuths_are_bins_does_not_know_turns_within_one():
+    def binned(rng: np.random.Generator, turn_deg: float) -> RadarScans:
+        measured = scans(rng, (0.0, 0.0, turn_deg))
+        points = measured.points_radar_m
+        range_m = np.linalg.norm(points, axis=1)
+        true_y = np.round(points[:, 1] / range_m * 4.0) / 4.0  # a place stays in its bin, whatever the noise
+        y, z = range_m * true_y, points[:, 2]
+        x = np.sqrt(np.maximum(range_m**2 - y**2 - z**2, 0.01))
+        return replace(measured, points_radar_m=np.stack([x, y, z], axis=1))
+
+    rng = np.random.default_rng(8)
+    turn = radar_turn(still_places(binned(rng, 0.0)), binned(rng, 0.3))
+
+    assert turn is not None
+    sigma = np.rad2deg(np.sqrt(turn.covariance_rad2[2, 2]))
+    assert abs(np.rad2deg(turn.rotation_rad[2]) - 0.3) < 3.0 * sigma
+    assert sigma > 1.0

@@ -1,5 +1,7 @@
 """What traffic says of a turn: an honest interval, what baseline and window share cancels, no single passage decides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,40 @@ def test_seconds_of_one_passage_do_not_count_as_independent():
     assert part is not None
     ratio = np.sqrt(part.covariance_rad2[1, 1] / whole.covariance_rad2[1, 1])
     assert ratio < 1.2
+
+
+def test_a_change_of_the_clocks_offset_is_told_from_a_turn_where_traffic_crosses_both_ways():
+    def crossing(rng: np.random.Generator, *, late_s: float, both: bool = True, **given) -> TrafficRows:
+        rows = traffic(rng, body_deg=0.2, **given)
+        rate = np.where(rows.directions == BEARING, np.where(both & (rows.passages % 2 == 0), 0.5, -0.5), 0.0)
+        design = np.concatenate([rows.design[:, :3], rate[:, None]], axis=1)
+        return replace(rows, design=design, residuals_rad=rows.residuals_rad + rate * late_s)
+
+    rng = np.random.default_rng(5)
+    model = learned(crossing(rng, late_s=0.02, passages=60))
+    later = {"passages": 20, "start_s": 600.0, "first": 100}
+
+    turn = model.turn(crossing(rng, late_s=0.07, turn_deg=(0.0, 0.6, 0.0), **later))
+    one_way = model.turn(crossing(rng, late_s=0.02, both=False, **later))
+
+    assert turn is not None
+    assert one_way is not None
+    assert turn.late_s[0] == pytest.approx(0.05, abs=3.0 * turn.late_s[1])
+    assert turn.late_s[1] < 0.005
+    assert np.rad2deg(turn.rotation_rad[1]) == pytest.approx(0.6, abs=0.2)
+    assert one_way.late_s[1] > 2.0 * turn.late_s[1]
+    wider = np.sqrt(one_way.covariance_rad2[1, 1] / turn.covariance_rad2[1, 1])
+    assert wider > 2.0
+
+
+def test_a_wrong_match_counts_less_and_few_far_rows_do_not_widen_the_rest():
+    rng = np.random.default_rng(6)
+    clean = traffic(rng, passages=60)
+    far = replace(clean, residuals_rad=clean.residuals_rad + np.where(clean.passages % 20 == 0, np.deg2rad(8.0), 0.0))
+
+    without, with_far = learned(clean).turn(clean), learned(far).turn(clean)
+
+    assert without is not None
+    assert with_far is not None
+    assert np.sqrt(with_far.covariance_rad2[1, 1] / without.covariance_rad2[1, 1]) < 1.4
+    assert abs(np.rad2deg(with_far.rotation_rad[1])) < 0.2

@@ -98,6 +98,17 @@ def test_words_and_json_always_state_the_power(project_root):
     assert sum(line.startswith("note: ") for line in baseline_lines(short)) == 1
 
 
+def test_a_change_of_the_clocks_offset_is_stated_where_it_is_known():
+    seen = SeenTurn(np.zeros(3), 1e-8 * np.eye(3), np.full(3, 1e-3), np.zeros(3), passages=9, late_s=(-0.05, 0.005))
+    verdict = Verdict("nothing", None, np.full(3, 1e-3), traffic=seen)
+    unknown = replace(verdict, traffic=replace(seen, late_s=(-0.02, 0.005)))
+
+    stated = [line for line in verdict_lines(verdict) if "50 ms earlier (95 %: 40 to 60)" in line]
+    assert len(stated) == 1
+    assert len([*verdict_lines(unknown)]) == len([*verdict_lines(verdict)]) - 1
+    assert json.loads(json_line(verdict, at=None))["traffic"]["images_late_s"] == {"change": -0.05, "sigma": 0.005}
+
+
 def test_a_recording_without_anything_gives_no_baseline():
     nothing = Stretch(TimeNs(0), TimeNs(30 * NS), None, RadarScans(), None, True)
     with pytest.raises(NoAnswerError):
