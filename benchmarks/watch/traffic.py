@@ -72,28 +72,52 @@ class Judged:
 
 def judged(kind: str, seed: int, seconds: int, folder: Path | None) -> Judged:
     """Simulate a recording, or read its rows from a folder, and watch it."""
-    rows = simulated_rows(kind, seed, seconds, folder)
-    length_ns = seconds * NS_PER_S // _PARTS
-    start = int(rows.times_ns.min())
-    part = np.minimum((rows.times_ns - start) // length_ns, _PARTS - 1)
-    models = [learned(rows.some(part != number)) for number in range(_PARTS)]
-    watches = [
-        _Part(model, rows.some(part == number), start + number * length_ns, seconds // _PARTS)
-        for number, model in enumerate(models)
-    ]
+    watches = _parts(simulated_rows(kind, seed, seconds, folder), seconds)
     z = {window: np.concatenate([one.z(window) for one in watches]) for window in (*_WINDOWS_S, 0)}
-    passages = float(np.mean([sum(model.passages) for model in models]))
+    passages = float(np.mean([sum(one.model.passages) for one in watches]))
     seen = np.array([[one.seen_after(axis, turn_deg) for _, axis, turn_deg in TURNS] for one in watches])
     sizes = np.array([[one.size_z(axis, turn_deg) for _, axis, turn_deg in SIZED] for one in watches])
     return Judged(kind, seconds / 3600.0, passages, z, sum(one.alarms() for one in watches), seen, sizes)
+
+
+def resampled(kind: str, seed: int, seconds: int, folder: Path | None, hours: float) -> tuple[int, int, float]:
+    """Draw whole passages where nothing turned; return the alarms, how many distinct passages there are, and the largest z.
+
+    A window has as many passages as one of the recording, each drawn from all in the same third, with replacement. Windows do
+    not overlap.
+    """
+    rng = np.random.default_rng([seed, 7])
+    alarms, distinct, largest = 0, 0, 0.0
+    for part in _parts(simulated_rows(kind, seed, seconds, folder), seconds):
+        distinct += len(np.unique(part.rows.passages))
+        for window in _WINDOWS_S:
+            pieces, counts = part.pieces(window)
+            for _ in range(round(hours * 3600.0 / _PARTS / window)):
+                drawn = rng.integers(len(pieces), size=counts[rng.integers(len(counts))])
+                rows = [replace(pieces[one], passages=np.full(len(pieces[one]), own)) for own, one in enumerate(drawn)]
+                turn = part.model.turn(TrafficRows.joined(rows)) if rows else None
+                z = 0.0 if turn is None else float(turn.least_z.max())
+                largest = max(largest, z)
+                alarms += z > _SIGMAS
+    return alarms, distinct, largest
+
+
+def _parts(rows: TrafficRows, seconds: int) -> "list[_Part]":
+    length_ns = seconds * NS_PER_S // _PARTS
+    start = int(rows.times_ns.min())
+    part = np.minimum((rows.times_ns - start) // length_ns, _PARTS - 1)
+    return [
+        _Part(learned(rows.some(part != one)), rows.some(part == one), start + one * length_ns, seconds // _PARTS)
+        for one in range(_PARTS)
+    ]
 
 
 class _Part:
     """A part of a recording that is watched with a baseline of the others."""
 
     def __init__(self, model: TrafficModel, rows: TrafficRows, start: int, seconds: int) -> None:
-        self._model = model
-        self._rows = rows
+        self.model = model
+        self.rows = rows
         self._start = start
         self._seconds = seconds
 
@@ -101,25 +125,32 @@ class _Part:
         times_s = (rows.times_ns - self._start) / NS_PER_S
         return rows.some((times_s >= first_s) & (times_s < end_s))
 
+    def pieces(self, window_s: int) -> tuple[list[TrafficRows], np.ndarray]:
+        """Return the passages, cut at the ends of windows that share no second, and how many each window has."""
+        window = (self.rows.times_ns - self._start) // (window_s * NS_PER_S)
+        keys, own = np.unique(np.stack([window, self.rows.passages], axis=1), axis=0, return_inverse=True)
+        pieces = [self.rows.some(own.reshape(-1) == one) for one in range(len(keys))]
+        return pieces, np.bincount(keys[:, 0], minlength=self._seconds // window_s)
+
     def z(self, window_s: int) -> np.ndarray:
         """Return (n, 3) turns over their standard deviations, in windows that share no second; 0 for all in one."""
         found = []
         for end in range(window_s or self._seconds, self._seconds + 1, window_s or self._seconds):
-            own = self._between(self._rows, end - (window_s or self._seconds), end)
-            turn = self._model.turn(own) if len(own) else None
+            own = self._between(self.rows, end - (window_s or self._seconds), end)
+            turn = self.model.turn(own) if len(own) else None
             if turn is not None and turn.passages >= 3:
                 found.append(turn.rotation_rad / np.sqrt(np.diag(turn.covariance_rad2)))
         return np.array(found).reshape(-1, 3)
 
     def alarms(self) -> int:
         """Return how many stretches show a turn for the first time, where nothing turned."""
-        seen = [np.zeros(3, dtype=np.bool_), *(traffic.turned for traffic in self._watched(self._rows))]
+        seen = [np.zeros(3, dtype=np.bool_), *(traffic.turned for traffic in self._watched(self.rows))]
         return sum(bool((after & ~before).any()) for before, after in pairwise(seen))
 
     def _turned(self, axis: int, turn_deg: float) -> TrafficRows:
-        moved = self._rows.design[:, axis] * np.deg2rad(turn_deg)
-        since = self._rows.times_ns >= self._start + _TURNS_AT_S * NS_PER_S
-        return replace(self._rows, residuals_rad=self._rows.residuals_rad + np.where(since, moved, 0.0))
+        moved = self.rows.design[:, axis] * np.deg2rad(turn_deg)
+        since = self.rows.times_ns >= self._start + _TURNS_AT_S * NS_PER_S
+        return replace(self.rows, residuals_rad=self.rows.residuals_rad + np.where(since, moved, 0.0))
 
     def seen_after(self, axis: int, turn_deg: float) -> float:
         """Return after how many seconds a turn about an axis is seen; infinity for never in three minutes."""
@@ -127,7 +158,7 @@ class _Part:
         for end in range(_TURNS_AT_S + _STEP_S, min(_TURNS_AT_S + _SEEN_FOR_S, self._seconds) + 1, _STEP_S):
             for window in _WINDOWS_S:
                 own = self._between(rows, end - window, end)
-                turn = self._model.turn(own) if len(own) else None
+                turn = self.model.turn(own) if len(own) else None
                 if turn is not None and turn.least_z[axis] > _SIGMAS:
                     return float(end - _TURNS_AT_S)
         return float("inf")
@@ -141,7 +172,7 @@ class _Part:
 
     def _watched(self, rows: TrafficRows) -> Iterator[SeenTurn]:
         """Yield what a watch says after each half minute."""
-        baseline = Baseline(BASELINE_SCHEMA, "0" * 64, "simulated", TimeNs(0), TimeNs(1), (1, 1), traffic=self._model)
+        baseline = Baseline(BASELINE_SCHEMA, "0" * 64, "simulated", TimeNs(0), TimeNs(1), (1, 1), traffic=self.model)
         watch = Watch(baseline, _WATCHED)
         for first in range(0, self._seconds, _STRETCH_S):
             own = self._between(rows, first, first + _STRETCH_S)
@@ -151,12 +182,22 @@ class _Part:
                 yield verdict.traffic
 
 
-def report(seed: int, seconds: int, count: int, folder: Path | None, processes: int) -> Iterator[str]:
-    """Yield what is found in a number of recordings, each with a seed of its own."""
+def report(
+    seed: int, seconds: int, count: int, folder: Path | None, processes: int, resampled_hours: float
+) -> Iterator[str]:
+    """Yield what is found in a number of recordings, each with a seed of its own, and in hours of passages drawn from them."""
     kinds = [KINDS[(number - _FIRST_SEED) % len(KINDS)] for number in range(seed, seed + count)]
     found: list[Judged] = []
+    given = kinds, range(seed, seed + count), [seconds] * count, [folder] * count
+    if resampled_hours:
+        with ProcessPoolExecutor(processes) as pool:
+            drawn = [*pool.map(resampled, *given, [resampled_hours / count] * count)]
+        alarms, distinct, _ = (sum(column) for column in zip(*drawn, strict=True))
+        largest = max(z for _, _, z in drawn)
+        yield f"{resampled_hours:g} h of {distinct} passages, drawn again and again: {alarms:.0f} alarms, largest z {largest:.1f}"
+        return
     with ProcessPoolExecutor(processes) as pool:
-        for one in pool.map(judged, kinds, range(seed, seed + count), [seconds] * count, [folder] * count):
+        for one in pool.map(judged, *given):
             found.append(one)
             print(f"{len(found)} of {count}: {one.kind}, {one.alarms} alarms", file=sys.stderr, flush=True)
     yield f"{count} recordings of {seconds} s, each third watched with a baseline of the others ({seconds * 2 // 3} s)"
