@@ -115,8 +115,10 @@ def solve_in_steps(
         if of_recording and isinstance(outcome, Calibration):
             outcome = dataclasses.replace(outcome, warnings=(*of_recording, *outcome.warnings))
         if isinstance(outcome, Calibration) and not outcome.checking and isinstance(recording, Recording):
-            turned = camera_turned_warnings(recording, clicks, camera, options)
-            outcome = dataclasses.replace(outcome, warnings=(*outcome.warnings, *turned)) if turned else outcome
+            warnings = (*outcome.warnings, *camera_turned_warnings(recording, clicks, camera, options))
+            if is_a_stretch(recording, clicks, camera, options):
+                warnings = tuple(one for one in warnings if one.code != "excluded-by-residual")
+            outcome = dataclasses.replace(outcome, warnings=warnings)
         yield _with_lost_data(outcome, recording, clicks, options) if isinstance(recording, Recording) else outcome
 
 
@@ -139,6 +141,17 @@ def camera_turned_warnings(
         if not warnings:
             return ()
     return warnings
+
+
+def is_a_stretch(
+    recording: Recording, clicks: Sequence[ReflectorClick], camera: Camera, options: CalibrationOptions
+) -> bool:
+    """Return whether the clicks that are excluded are all on one side of a turn of the camera, and the others on the other."""
+    excluded = {click.id for click in clicks if click.excluded}
+    every = [dataclasses.replace(click, excluded=False) for click in clicks]
+    others = {click.id for click in every if click.counts} - excluded
+    found = camera_turned_warnings(recording, every, camera, options) if excluded else ()
+    return any(set(one.facts["ids"]) in (excluded, others) for one in found)
 
 
 def _turns_since_the_first(recording: Recording, times: TimesNs, camera: Camera) -> dict[TimeNs, Turn | None]:

@@ -1,12 +1,15 @@
 """The images that were clicked say whether the camera turned; each is decoded once."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
+import pytest
 
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
-from cocalib.solving.solving import camera_turned_warnings
+from cocalib.solving.solving import camera_turned_warnings, is_a_stretch
 from tests.unit.watching.test_still_image import CAMERA, scene, turned
 
 
@@ -46,3 +49,19 @@ def test_a_camera_that_stands_still_and_a_single_click_say_nothing():
     assert camera_turned_warnings(_Recording(0.0), CLICKS, CAMERA, CalibrationOptions()) == ()
     assert camera_turned_warnings(_Recording(0.5), CLICKS[:1], CAMERA, CalibrationOptions()) == ()
     assert camera_turned_warnings(_Recording(0.5), [], CAMERA, CalibrationOptions()) == ()
+
+
+@pytest.mark.parametrize(
+    ("turned_deg", "excluded", "expected"),
+    [
+        (0.5, "c0 c1 c2", True),
+        (0.5, "c3 c4 c5 c6 c7 c8 c9", True),
+        (0.5, "c0 c1", False),
+        (0.5, "", False),
+        (0.0, "c0 c1 c2", False),
+    ],
+)
+def test_the_clicks_of_one_side_of_a_turn_are_a_stretch_to_be_solved_on_its_own(turned_deg, excluded, expected):
+    clicks = [replace(click, excluded=click.id in excluded.split()) for click in CLICKS]
+
+    assert is_a_stretch(_Recording(turned_deg), clicks, CAMERA, CalibrationOptions()) is expected
