@@ -6,6 +6,7 @@ Such a lens model is one function, which maps an ideal point (x, y) = (X / Z, Y 
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -79,15 +80,13 @@ def _distort(x: Values, y: Values, k: list[float]) -> tuple[tuple[Values, Values
     return (distorted_x, distorted_y), (d_xx, d_xy, d_yy)
 
 
-PINHOLE = LensModel(
+_brown_conrady = partial(LensModel, project=_project, unproject=_unproject, is_perspective=True, opencv="projectPoints")
+
+PINHOLE = _brown_conrady(
     name="pinhole",
     coefficients=(),
     counts=(0,),
-    project=_project,
-    unproject=_unproject,
     coefficient_jacobian=_coefficient_jacobian_without,
-    is_perspective=True,
-    opencv="projectPoints",
     typical=TypicalLens(),
     names_elsewhere=(
         NameElsewhere("camera_info", "plumb_bob", 5),
@@ -99,15 +98,11 @@ PINHOLE = LensModel(
     names_in_files=("none", "pinhole"),
 )
 
-PLUMB_BOB = LensModel(
+PLUMB_BOB = _brown_conrady(
     name="plumb_bob",
     coefficients=_COEFFICIENTS[:5],
     counts=(4, 5),
-    project=_project,
-    unproject=_unproject,
     coefficient_jacobian=_coefficient_jacobian_of_five,
-    is_perspective=True,
-    opencv="projectPoints",
     typical=TypicalLens((-0.17, 0.032, 0.0006, -0.0004, 0.0)),
     names_elsewhere=(
         NameElsewhere("camera_info", "plumb_bob", 5),
@@ -121,15 +116,11 @@ PLUMB_BOB = LensModel(
     names_in_messages=("plumb_bob", "radtan", "brown_conrady", ""),
 )
 
-RATIONAL_POLYNOMIAL = LensModel(
+RATIONAL_POLYNOMIAL = _brown_conrady(
     name="rational_polynomial",
     coefficients=_COEFFICIENTS,
     counts=(8,),
-    project=_project,
-    unproject=_unproject,
     coefficient_jacobian=_coefficient_jacobian,
-    is_perspective=True,
-    opencv="projectPoints",
     typical=TypicalLens((0.62, 0.21, 0.0005, -0.0003, 0.012, 0.79, 0.33, 0.045)),
     names_elsewhere=(
         NameElsewhere("camera_info", "rational_polynomial", 8),
