@@ -5,6 +5,7 @@ python -m benchmarks.watch --resampled 1000 --keep FOLDER
 python -m benchmarks.watch image [--seed 2100] [--count 8] [--keep FOLDER]
 python -m benchmarks.watch returns [--seed 2300] [--count 6]
 python -m benchmarks.watch cost [--seed 2200] [--count 40]
+python -m benchmarks.watch scenes --folders FIRST OTHER... --focal-px 706
 
 traffic: boxes as a detector would draw them, edges off by 1 px and 2 % in each frame and by 2 % for a whole track, one box in
 twenty missed, no tracks. image: rendered scenes in other light, with other cars, in rain. returns: a radar that turns. cost:
@@ -16,12 +17,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.watch import cost, still_image, still_returns, traffic
+from benchmarks.watch import cost, scenes, still_image, still_returns, traffic
 
 __all__ = ["main"]
 
-_SEEDS = {"traffic": 2000, "image": 2100, "returns": 2300, "cost": 2200}
-_COUNTS = {"traffic": 39, "image": 8, "returns": 6, "cost": 40}
+_SEEDS = {"traffic": 2000, "image": 2100, "returns": 2300, "cost": 2200, "scenes": 0}
+_COUNTS = {"traffic": 39, "image": 8, "returns": 6, "cost": 40, "scenes": 0}
 
 
 def main() -> int:
@@ -34,12 +35,15 @@ def main() -> int:
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--resampled", type=float, default=0.0, metavar="HOURS")
+    parser.add_argument("--folders", type=Path, nargs="+", default=[])
+    parser.add_argument("--focal-px", type=float, default=1000.0)
     given = parser.parse_args()
     seed, count = given.seed or _SEEDS[given.what], given.count or _COUNTS[given.what]
     lines = {
         "traffic": lambda: traffic.report(seed, given.seconds, count, given.keep, given.processes, given.resampled),
         "image": lambda: still_image.report(seed, count, given.keep),
         "returns": lambda: still_returns.report(seed, count),
+        "scenes": lambda: scenes.report(given.folders, given.focal_px),
         "cost": lambda: cost.report(seed, count),
     }
     for line in lines[given.what]():
