@@ -83,8 +83,8 @@ def judged(kind: str, seed: int, seconds: int, folder: Path | None) -> Judged:
 def resampled(kind: str, seed: int, seconds: int, folder: Path | None, hours: float) -> tuple[int, int, float]:
     """Draw whole passages where nothing turned; return the alarms, how many distinct passages there are, and the largest z.
 
-    A window has as many passages as one of the recording, each drawn from all in the same third, with replacement. Windows do
-    not overlap.
+    A window has as many passages as one of the recording, drawn from all in the same third, none twice. Windows do not
+    overlap.
     """
     rng = np.random.default_rng([seed, 7])
     alarms, distinct, largest = 0, 0, 0.0
@@ -93,7 +93,7 @@ def resampled(kind: str, seed: int, seconds: int, folder: Path | None, hours: fl
         for window in _WINDOWS_S:
             pieces, counts = part.pieces(window)
             for _ in range(round(hours * 3600.0 / _PARTS / window)):
-                drawn = rng.integers(len(pieces), size=counts[rng.integers(len(counts))])
+                drawn = rng.choice(len(pieces), counts[rng.integers(len(counts))], replace=False)
                 rows = [replace(pieces[one], passages=np.full(len(pieces[one]), own)) for own, one in enumerate(drawn)]
                 turn = part.model.turn(TrafficRows.joined(rows)) if rows else None
                 z = 0.0 if turn is None else float(turn.least_z.max())
