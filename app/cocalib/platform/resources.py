@@ -27,9 +27,9 @@ def static_folder() -> Path:
 
 
 def site_folder() -> Path | None:
-    """Return the folder of the documentation, as `make docs` writes it into the package; None if that was not done."""
+    """Return the folder of the documentation, as `make docs` writes it into the package; None if it is not there or not whole."""
     folder = _PACKAGE_FOLDER / "site"
-    return folder if folder.is_dir() else None
+    return folder if (folder / "index.html").is_file() else None
 
 
 def sample_folder() -> Path:
