@@ -5,7 +5,7 @@ import importlib.metadata
 import pytest
 
 from cocalib.platform import resources
-from cocalib.platform.resources import InstallationError, sample_folder, static_folder, version
+from cocalib.platform.resources import InstallationError, sample_folder, site_folder, static_folder, version
 
 
 def test_a_checkout_has_its_files_at_its_top(project_root):
@@ -19,6 +19,15 @@ def test_an_installed_package_has_its_files_inside(tmp_path, monkeypatch):
     (tmp_path / "site-packages" / "static").mkdir()  # another package's
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", package)
     assert static_folder() == package / "static"
+
+
+def test_documentation_whose_build_was_cut_off_counts_as_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(resources, "_PACKAGE_FOLDER", tmp_path)
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "method.html").touch()
+    assert site_folder() is None
+    (tmp_path / "site" / "index.html").touch()
+    assert site_folder() == tmp_path / "site"
 
 
 def test_missing_files_are_reported_with_the_folders_searched(tmp_path, monkeypatch):
