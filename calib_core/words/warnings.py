@@ -421,8 +421,8 @@ def camera_far_away(
         )
     return remark(
         f"another pose, {away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} σ), explains the pairs as well; the one "
-        "with the camera "
-        f"{here_m:.1f} m from the radar, not {there_m:.1f} m, was chosen only because about {expected_m:g} m is expected",
+        f"with the camera {here_m:.1f} m from the radar, not {there_m:.1f} m, was chosen only because about {expected_m:g} m is "
+        "expected",
         say(
             "are both sensors on the same rig, or how far apart? Set {distance}, or measure the camera position",
             distance=distance,

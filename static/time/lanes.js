@@ -22,7 +22,7 @@ const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", imag
 const LARGE = 140;
 
 /** @typedef {CanvasRenderingContext2D} Context2D */
-/** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./ruler.js").Folding}} Axis */
+/** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, isPart: boolean, folding: import("./ruler.js").Folding}} Axis */
 
 /** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @param {boolean} [rows] whether placements lie below each other @returns {Boxes} */
 export function laneBoxes(height, rows = false) {
@@ -256,11 +256,11 @@ function drawCursor(pen, height, x) {
 export const OVERVIEW = 6;
 
 /** While a part is shown: all placements below it, with the part in a frame. @param {Context2D} pen @param {number} width @param {number} height @param {Axis} axis */
-function drawOverview(pen, width, height, { from_s, to_s, folding }) {
+function drawOverview(pen, width, height, { from_s, to_s, isPart, folding }) {
+  if (!isPart) return;
   const [room, last] = [width - lanes.left - lanes.right, toFolded(folding, state.seconds[state.seconds.length - 1])];
   const at = (/** @type {number} */ seconds) => lanes.left + room * Math.min(1, Math.max(0, toFolded(folding, seconds) / last));
   const [left, wide] = [at(from_s), at(to_s) - at(from_s)];
-  if (wide > 0.99 * room) return;
   pen.fillStyle = themeColour("surface");
   pen.fillRect(lanes.left - 8, height - OVERVIEW, width, OVERVIEW);
   pen.fillStyle = themeColour("accent");

@@ -126,8 +126,11 @@ function scrub(event) {
   jump(stemNear(event.offsetX, reach)?.frame ?? nearestIndex(toSeconds(event.offsetX)));
 }
 
+/** Whether less than everything is shown. */
+const isPart = () => span.to - span.from < 0.99 * length();
+
 /** Whether a pointer is on the strip that shows everything while a part is shown. @param {PointerEvent} event */
-const onOverview = (event) => span.to - span.from < 0.99 * length() && event.offsetY >= canvas.clientHeight - OVERVIEW;
+const onOverview = (event) => isPart() && event.offsetY >= canvas.clientHeight - OVERVIEW;
 
 /** @param {number} x @param {number} reach CSS px */
 function stemNear(x, reach) {
@@ -212,7 +215,7 @@ function redraw() {
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     follow();
-    const axis = { toX, from_s: unfolded(folding, span.from), to_s: unfolded(folding, span.to), folding };
+    const axis = { toX, from_s: unfolded(folding, span.from), to_s: unfolded(folding, span.to), isPart: isPart(), folding };
     drawLanes(pen, wide, high, axis, pointer);
     label();
   });

@@ -116,8 +116,9 @@ def solve_in_steps(
             outcome = dataclasses.replace(outcome, warnings=(*of_recording, *outcome.warnings))
         if isinstance(outcome, Calibration) and not outcome.checking and isinstance(recording, Recording):
             warnings = (*outcome.warnings, *camera_turned_warnings(recording, clicks, camera, options))
-            if is_a_stretch(recording, clicks, camera, options):
-                warnings = tuple(one for one in warnings if one.code != "excluded-by-residual")
+            apart = tuple(one for one in warnings if one.code != "excluded-by-residual")
+            if len(apart) < len(warnings) and is_a_stretch(recording, clicks, camera, options):
+                warnings = apart
             outcome = dataclasses.replace(outcome, warnings=warnings)
         yield _with_lost_data(outcome, recording, clicks, options) if isinstance(recording, Recording) else outcome
 
