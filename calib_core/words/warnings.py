@@ -977,7 +977,7 @@ def camera_turned(*, turned_deg: float, last_s: float, first_s: float, ids: Sequ
 
 
 def _clock(seconds: float) -> str:
-    return f"{int(seconds // 60):02d}:{int(seconds % 60):02d}"
+    return f"{int(seconds // 60)}:{int(seconds % 60):02d}"
 
 
 def carried_forward(*, turned_deg: Mapping[str, float], sha256: str) -> Remark:

@@ -380,13 +380,14 @@ function inset({ u_px, v_px, width_px, height_px, pair }, failed) {
 /** What is to be known before saving: what the pose rests on, what the file cannot hold, the warnings. @param {Record<string, any>} preview */
 function beforeSaving(preview) {
   const missing = preview.missing ? [make("div", "missing", [icon("warning"), make("strong", "", preview.missing)])] : [];
-  return [make("div", "evidence", preview.evidence), ...missing, ...warningBox(preview.warnings)];
+  return [make("div", "evidence", preview.evidence), ...missing, ...warningBox()];
 }
 
-/** The warnings of the calibration. @param {import("../messages.js").WarningRow[]} rows */
-function warningBox(rows) {
+/** The warnings that the panel's head counts: the verdict, above, says its own cause. */
+function warningBox() {
+  const rows = (state.view?.warnings ?? []).filter(({ code }) => !state.view?.acknowledged.includes(code));
   if (!rows.length) return [];
-  const title = rows.length === 1 ? "This calibration has one warning" : `This calibration has ${rows.length} warnings`;
+  const title = rows.length === 1 ? "This calibration has 1 warning" : `This calibration has ${rows.length} warnings`;
   const items = rows.map((row) => {
     const item = make("li", "", said(row.message));
     item.dataset.hint = said(row.hint);

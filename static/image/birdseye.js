@@ -7,7 +7,7 @@ import { attemptFirst } from "../base/actions.js";
 import { degrees, sideways } from "../base/angles.js";
 import { amplitudeColour, ink, smallFont, themeColour } from "../base/colours.js";
 import { hideTip, make, showTip } from "../base/notices.js";
-import { emit, on, placementAt, state } from "../base/state.js";
+import { emit, on, placementAt, state, timeText } from "../base/state.js";
 import { goTo, pause, tellCursor } from "../time/player.js";
 
 /** @typedef {import("../messages.js").RadarReturn} Return */
@@ -367,7 +367,7 @@ function drawTable() {
   }));
   const rows = state.placements.map((placement, index) => {
     const lasted = `${(placement.end_s - placement.start_s).toFixed(1)} s`;
-    const cells = [String(index + 1), `${placement.start_s.toFixed(1)} s`, lasted, `${placement.range_m.toFixed(1)} m`, sideways(placement.azimuth_deg), decibels(placement.snr_db), decibels(placement.stands_out_db)];
+    const cells = [String(index + 1), timeText(placement.start_s, 1), lasted, `${placement.range_m.toFixed(1)} m`, sideways(placement.azimuth_deg), decibels(placement.snr_db), decibels(placement.stands_out_db)];
     const row = make("tr", placement.note ? "row odd" : "row", cells.map((words) => make("td", "", words)));
     row.dataset.placement = String(index);
     row.dataset.hint = [describe(placement), placement.note].filter(Boolean).join("\n");

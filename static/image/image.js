@@ -5,7 +5,7 @@
 
 import { drawLayers } from "../base/layers.js";
 import { keepClear } from "../base/notices.js";
-import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, residualText, state } from "../base/state.js";
+import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, residualText, state, timeText } from "../base/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
@@ -164,7 +164,7 @@ function lookWords() {
 }
 
 /** @param {number} index */
-const moment = (index) => `Frame ${index + 1} of ${state.seconds.length}, ${(state.seconds[index] ?? 0).toFixed(1)} s`;
+const moment = (index) => `Frame ${index + 1} of ${state.seconds.length}, ${timeText(state.seconds[index] ?? 0, 1)}`;
 
 /** @param {number} index */
 function placementWords(index) {

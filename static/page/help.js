@@ -19,7 +19,7 @@ const MOUSE = [
 ];
 /** @type {[string, string][]} */
 const MARKS = [
-  ["M8 1v5M8 10v5M1 8h5M10 8h5", "cross: your click; small and coloured: a click in another frame"],
+  ["M8 1v5M8 10v5M1 8h5M10 8h5", "cross: your click; small and colored: a click in another frame"],
   ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "hollow cross: excluded click"],
   ["M8 3a5 5 0 1 0 .01 0z", "ring: reprojection of its radar position"],
   ["M2 13 13 3", "line between them: residual"],

@@ -3,7 +3,7 @@
 import { act, ACTIONS, keyNames, reasonAgainst, register } from "../base/actions.js";
 import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
-import { clicks, isClicked, nameOf, residualText, select, state, stateOf } from "../base/state.js";
+import { clicks, isClicked, nameOf, residualText, select, state, stateOf, timeText } from "../base/state.js";
 import { openOption, optionRows } from "../options/options.js";
 import { comeTo } from "../image/arriving.js";
 import { goTo, nearestIndex, pause } from "../time/player.js";
@@ -196,7 +196,7 @@ function placements() {
     id: `placement:${index + 1}`,
     group: "Placement",
     words: `Placement ${index + 1}`,
-    detail: `${(state.seconds[placement.frame] ?? 0).toFixed(1)} s, ${placement.range_m.toFixed(1)} m away${state.looking || isClicked(placement) ? "" : ", no click yet"}`,
+    detail: `${timeText(state.seconds[placement.frame] ?? 0, 1)}, ${placement.range_m.toFixed(1)} m away${state.looking || isClicked(placement) ? "" : ", no click yet"}`,
     also: `of ${count} ${stateOf(placement) === "unlikely" ? STILL : "reflector"}`,
     reason: "",
     run: () => comeTo(placement.frame),
@@ -211,7 +211,7 @@ function pairs() {
       id: `pair:${click.id}`,
       group: "Pair",
       words: `Pair ${nameOf(click.id)}`,
-      detail: [`${(state.seconds[click.frame] ?? 0).toFixed(1)} s`, click.range_m === null ? "" : `${click.range_m.toFixed(1)} m`, residual].filter(Boolean).join(", "),
+      detail: [timeText(state.seconds[click.frame] ?? 0, 1), click.range_m === null ? "" : `${click.range_m.toFixed(1)} m`, residual].filter(Boolean).join(", "),
       also: `click mark ${click.state}`,
       reason: "",
       run: () => {
@@ -262,14 +262,14 @@ function frame(number) {
   const count = state.seconds.length;
   const seconds = state.seconds[number - 1];
   const reason = seconds === undefined ? `The recording has frames 1 to ${count}` : "";
-  return { id: "frame", group: "Time", words: `Frame ${number}`, detail: seconds === undefined ? "" : `${seconds.toFixed(2)} s`, reason, run: () => go(number - 1) };
+  return { id: "frame", group: "Time", words: `Frame ${number}`, detail: seconds === undefined ? "" : timeText(seconds, 2), reason, run: () => go(number - 1) };
 }
 
 /** @param {number} seconds @returns {Entry} */
 function time(seconds) {
   const last = state.seconds[state.seconds.length - 1];
   const index = nearestIndex(seconds);
-  const reason = seconds > last ? `The recording ends at ${last.toFixed(1)} s` : "";
+  const reason = seconds > last ? `The recording ends at ${timeText(last, 1)}` : "";
   return { id: "time", group: "Time", words: `Time ${seconds} s`, detail: reason ? "" : `frame ${index + 1}`, reason, run: () => go(index) };
 }
 

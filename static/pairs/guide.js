@@ -72,6 +72,7 @@ const REMOVE = { key: "Del", label: "delete it", action: "delete" };
 const SHOW = { key: "J", label: "show", action: "worst" };
 const POSITION = { key: "", label: "enter the camera position", option: "solving.camera_position" };
 const LENS = { key: "", label: "open Lens", action: "lens" };
+const ASSUMED = { key: "", label: "open Recording", action: "recording" };
 const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
 const TOGETHER = { key: "", label: "open recordings together", action: "recording" };
 const JUDGE = { key: "", label: "judge a calibration", action: "evaluate" };
@@ -173,7 +174,7 @@ function doneWords({ verdict }) {
 }
 
 /** What begins the verdict's action: a field or a panel. @param {import("../messages.js").VerdictRow} verdict @returns {Words} */
-const does = ({ option, kind }) => (option === POSITION.option ? [POSITION] : kind === "CalibrateLens" ? [LENS] : option && option !== RANGE.option ? [{ key: "", label: "open this option", option }] : []);
+const does = ({ option, kind }) => (option === POSITION.option ? [POSITION] : kind === "CalibrateLens" ? [LENS] : kind === "ConfirmAssumptions" ? [ASSUMED] : option && option !== RANGE.option ? [{ key: "", label: "open this option", option }] : []);
 
 /** The pair that the verdict's action is about. @param {import("../messages.js").VerdictRow} verdict @returns {Key[]} */
 const pairOf = ({ pairs }) => pairs.filter((id) => clicks().some((click) => click.id === id)).slice(0, 1).map((pair) => ({ key: "", label: `show ${called(pair)}`, pair }));

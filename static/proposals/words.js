@@ -78,7 +78,7 @@ let chip;
 
 export function startSwitch() {
   addLayer("proposal", drawProposal);
-  register({ id: "proposals", group: "Mark", words: "Suggestions on or off", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withImages });
+  register({ id: "proposals", group: "Mark", words: "Proposals on or off", keys: ["O"], also: "automatic find suggestions off on switch", run: toggleProposals, when: withImages });
   attemptFirst("next-placement", () => nextProposal() || (sayNone(), false));
   attemptFirst("previous-placement", previousProposal);
   attemptFirst("place-mark", () => takesEnter() && !state.cross && (acceptProposal(), true));

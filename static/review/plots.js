@@ -8,7 +8,7 @@ import { hideTip, make, showTip } from "../base/notices.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
 /** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */
-/** @typedef {{label: string, low: number, high: number}} Axis */
+/** @typedef {{label: string, low: number, high: number, words?: (value: number) => string}} Axis */
 /** @typedef {{marks: Mark[], x: Axis, y: Axis, bar: number, limit: number|null, empty: string}} Content */
 /** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void, line?: (value: number) => void}} Listener */
 /** What is highlighted in all plots. @typedef {{hovered: Set<string>, brushed: Set<string>, selected: string|null}} Highlight */
@@ -117,7 +117,7 @@ export class Plot {
         pen.stroke();
         pen.fillStyle = this.colour.muted;
         pen.textAlign = upright ? "right" : "center";
-        pen.fillText(words(value), upright ? EDGE.left - 5 : Math.min(x, right - 6), upright ? y + 3.5 : floor + 12);
+        pen.fillText((axis.words ?? words)(value), upright ? EDGE.left - 5 : Math.min(x, right - 6), upright ? y + 3.5 : floor + 12);
       }
     }
     pen.strokeStyle = this.colour["line-strong"];

@@ -4,7 +4,7 @@ import { register, withImages } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make } from "../base/notices.js";
 import { tell } from "../base/socket.js";
-import { clicks, nameOf, on, said, select, state } from "../base/state.js";
+import { clicks, nameOf, on, said, select, state, timeText } from "../base/state.js";
 import { comeTo } from "../image/arriving.js";
 import { Plot } from "./plots.js";
 import { contactSheet, drawSheet, markSheet, nextUnreviewed } from "./sheet.js";
@@ -31,11 +31,11 @@ const PARTS = [
   ["right", "Right", "How far right of the click the reprojection is [px]."],
   ["down", "Down", "How far below the click the reprojection is [px]."],
 ];
-/** Plots of the residual: key, title, label of the axis, and where a pair is on it. @type {[string, string, string, (row: Row) => number|null][]} */
+/** Plots of the residual: key, title, label of the axis, where a pair is on it, and a value of the axis in words. @type {[string, string, string, (row: Row) => number|null, ((value: number) => string)?][]} */
 const AGAINST = [
   ["range", "Residual against range", "range [m]", (row) => row.click.range_m],
   ["azimuth", "Residual against azimuth", "azimuth, left positive [°]", (row) => row.click.azimuth_deg],
-  ["time", "Residual against time", "time [s]", (row) => state.seconds[row.click.frame] ?? null],
+  ["time", "Residual against time", "time", (row) => state.seconds[row.click.frame] ?? null, (value) => timeText(value, Number.isInteger(value) ? 0 : 1)],
 ];
 
 const shown = { kinds: new Set(KINDS.map(([kind]) => kind)), low: 0, high: Infinity, line: /** @type {number|null} */ (null), part: /** @type {(typeof PARTS)[number][0]} */ ("length") };
@@ -230,19 +230,19 @@ function change(what) {
 
 function drawPlots() {
   const drawn = rows().filter(passes);
-  for (const [key, , label, at] of AGAINST) plots.get(key)?.show(scatter(drawn, label, at), highlight);
+  for (const [key, , label, at, words] of AGAINST) plots.get(key)?.show(scatter(drawn, label, at, words), highlight);
 }
 
 const EMPTY = "no clicks to show";
 
-/** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @returns {Content} */
-function scatter(drawn, label, at) {
+/** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @param {(value: number) => string} [words] @returns {Content} */
+function scatter(drawn, label, at, words) {
   const marks = drawn.filter((row) => at(row) !== null).map((row) => ({ ids: [row.click.id], x: Number(at(row)), y: row[shown.part], kind: row.kind, text: told(row) }));
   const limitPx = state.view?.residual_limit_px ?? null;
   const usual = drawn.filter((row) => row.kind === "agreeing").map((row) => Math.abs(row[shown.part]));
   const most = 1.12 * Math.max(1e-3, ...(usual.length ? usual : drawn.map((row) => Math.abs(row[shown.part]))));
   const y = { label: `${shown.part === "length" ? "residual" : `residual ${shown.part}`} [px]`, low: shown.part === "length" ? 0 : -most, high: most };
-  return { marks, x: { label, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
+  return { marks, x: { label, words, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
 }
 
 /** @param {Mark|null} mark */

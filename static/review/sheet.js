@@ -39,15 +39,18 @@ export function drawSheet(rows, marked, highlight) {
   const reviewed = new Set(state.view?.reviewed ?? []);
   const known = new Set(rows.map((row) => row.click.id));
   for (const id of [...cells.keys()]) if (!known.has(id)) cells.delete(id);
-  const shown = rows.map((row) => {
+  /** @type {HTMLElement[]} */
+  const first = [];
+  const shown = rows.map((row, index) => {
     const { id } = row.click;
     const cell = cells.get(id) ?? make("button", "", []);
     cells.set(id, cell);
-    fill(cell, row, reviewed.has(id));
+    if (fill(cell, row, reviewed.has(id))) index < BATCH ? first.push(cell) : observer.observe(cell);
     cell.classList.toggle("marked", marked.has(id));
     mark(cell, highlight);
     return cell;
   });
+  if (first.length) getCutOuts(first); // the server makes them while the browser lays out the others
   if (shown.length !== sheet.children.length || shown.some((cell, index) => cell !== sheet.children[index])) {
     const held = sheet.contains(document.activeElement) ? /** @type {HTMLElement} */ (document.activeElement) : null;
     sheet.replaceChildren(...shown);
@@ -79,23 +82,23 @@ function mark(cell, { hovered, brushed, selected }) {
   cell.setAttribute("aria-current", String(selected === id));
 }
 
-/** @param {HTMLButtonElement} cell @param {Row} row @param {boolean} isReviewed */
+/** @param {HTMLButtonElement} cell @param {Row} row @param {boolean} isReviewed @returns {boolean} whether it needs a cut-out */
 function fill(cell, { click, kind, right, down, length }, isReviewed) {
   const side = Math.min(MOST, SIDE * 2 ** Math.max(0, Math.ceil(Math.log2((WIDER * length) / SIDE))));
   const { sec, nanosec } = stampOf(click.frame);
   const source = `${sec}${String(nanosec).padStart(9, "0")},${click.u_px.toFixed(2)},${click.v_px.toFixed(2)},${side}`;
   const words = `${nameOf(click.id)}: ${residualText(length)}${kind === "agreeing" ? "" : `, ${kind}`}${isReviewed ? ", reviewed" : ""}`;
   const drawn = `${source} ${right.toFixed(1)} ${down.toFixed(1)} ${words}`;
-  if (cell.dataset.drawn === drawn) return;
+  if (cell.dataset.drawn === drawn) return false;
   cell.className = `crop ${kind}${isReviewed ? " reviewed" : ""}`;
   Object.assign(cell.dataset, { id: click.id, drawn, source, roves: KEYS });
   cell.setAttribute("aria-label", words);
   cell.onclick = () => arrive(click.id);
   const image = cell.querySelector("img");
   cell.replaceChildren(...(image ? [image, arrow(side, right, down)] : []), make("span", "", [make("b", "", nameOf(click.id)), ` ${residualText(length)}${isReviewed ? " ✓" : ""}`]));
-  if (image?.dataset.source === source) return;
+  if (image?.dataset.source === source) return false;
   arrows.set(cell, () => arrow(side, right, down));
-  observer.observe(cell);
+  return true;
 }
 
 /** Get the cut-outs that are near the part in sight. @param {IntersectionObserverEntry[]} entries */

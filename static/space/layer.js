@@ -183,7 +183,7 @@ function drawLook(look, place, board) {
   }
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) => {
     const at = place(position_m, pixel_px);
-    if (!at) return;
+    if (!at || (!spaceOptions.camera && known !== "open" && known !== "marked")) return; // the scene has no ring there
     if (spaceOptions.camera && known !== "marked") ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, [3, 3]);
     label(board, String(index + 1), at[0] + smallPx(), at[1] - 0.9 * smallPx(), known === "open" ? "accent" : "faint");
   });

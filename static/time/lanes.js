@@ -49,7 +49,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
   const rows = rowsOf(state.placements);
-  const boxes = laneBoxes(height, rows.some(({ of }) => of() > 1));
+  const boxes = laneBoxes(height, rows.some(({ group }) => group.ends.length > 1));
   lanes.left = 6.7 * smallPx();
   pen.save();
   pen.beginPath();
@@ -64,9 +64,12 @@ export function drawLanes(pen, width, height, axis, pointer) {
   const sure = offers.confidences();
   const { top, bottom } = boxes.placements;
   state.placements.forEach((placement, index) => {
-    const { row, of } = rows[index];
-    const high = (bottom - top + 1) / of();
-    drawPlacement(pen, placement, sure.get(index) ?? 0, { top: top + row * high, bottom: top + (row + 1) * high - 1 }, axis);
+    const { row, group } = rows[index];
+    const high = (bottom - top + 1) / group.ends.length;
+    const middle = drawPlacement(pen, placement, sure.get(index) ?? 0, { top: top + row * high, bottom: top + (row + 1) * high - 1 }, axis);
+    if (middle === null) return;
+    if (high >= 10) drawNumber(pen, `${index + 1}`, middle + smallPx() * (row - (group.ends.length - 1) / 2), top + (row + 0.5) * high);
+    else if (index === group.last) drawNumber(pen, `${group.first + 1}–${index + 1}`, middle, (top + bottom) / 2);
   });
   for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
   if (pointer !== null && pointer >= lanes.left) {
@@ -91,28 +94,38 @@ function drawNames(pen, boxes) {
   }
 }
 
-/** Placements of one time lie below each other: the row of each, and how many there are. @param {import("../messages.js").PlacementRow[]} placements */
+/** Placements of one time are a group and lie below each other: the row of each, and its group, with when each row is free again. @param {import("../messages.js").PlacementRow[]} placements */
 function rowsOf(placements) {
-  /** @type {number[]} */
-  let ends = [];
-  /** @type {{row: number, of: () => number}[]} */
-  return placements.map(({ start_s, end_s }) => {
-    if (ends.every((end) => end <= start_s)) ends = [];
-    const own = ends;
-    const free = own.findIndex((end) => end <= start_s);
-    const row = free < 0 ? own.length : free;
-    own[row] = end_s;
-    return { row, of: () => own.length };
+  let group = { ends: /** @type {number[]} */ ([]), first: 0, last: 0 };
+  return placements.map(({ start_s, end_s }, index) => {
+    if (group.ends.every((end) => end <= start_s)) group = { ends: [], first: index, last: index };
+    const free = group.ends.findIndex((end) => end <= start_s);
+    const row = free < 0 ? group.ends.length : free;
+    group.ends[row] = end_s;
+    group.last = index;
+    return { row, group };
   });
+}
+
+/** @param {Context2D} pen @param {string} words @param {number} x @param {number} y */
+function drawNumber(pen, words, x, y) {
+  pen.font = smallFont(1, "600");
+  [pen.textAlign, pen.textBaseline] = ["center", "middle"];
+  pen.lineWidth = 3;
+  pen.strokeStyle = themeColour("accent-soft");
+  if (words.includes("–")) pen.strokeText(words, x, y + 0.5);
+  pen.fillStyle = themeColour("ink");
+  pen.fillText(words, x, y + 0.5);
 }
 
 /**
  * Marked = solid, not marked = hollow and dashed, dismissed = a line with a cross, hardly the reflector = faint.
  * With a proposal: a bar at the lower edge, the longer the surer it is.
  * @param {Context2D} pen @param {import("../messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
+ * @returns {number|null} x of its number, if there is room
  */
 function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
-  if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
+  if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return null;
   const here = state.seconds[state.cursor];
   const left = axis.toX(Math.max(placement.start_s, state.seconds[0]));
   const wide = Math.max(5, axis.toX(Math.min(placement.end_s, state.seconds[state.seconds.length - 1])) - left);
@@ -123,7 +136,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   pen.beginPath();
   pen.roundRect(left, top, wide, bottom - top, 3);
   pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" || fate === "unlikely" ? "faint" : "accent");
-  if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2);
+  if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2), null;
   pen.fillStyle = themeColour(fate === "marked" ? "accent" : "accent-soft");
   pen.globalAlpha = fate === "marked" ? 0.55 : 1;
   if (fate !== "unlikely") pen.fill();
@@ -135,11 +148,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
     pen.fillStyle = themeColour("accent");
     pen.fillRect(left + 1, bottom - 2.5, Math.max(2, (wide - 2) * sure), 2.5);
   }
-  if (to - from < 15 || bottom - top < 9) return;
-  pen.font = smallFont(1, "600");
-  [pen.textAlign, pen.textBaseline] = ["center", "middle"];
-  pen.fillStyle = themeColour("ink");
-  pen.fillText(`${state.placements.indexOf(placement) + 1}`, (from + to) / 2, (top + bottom) / 2 + 0.5);
+  return to - from < 15 ? null : (from + to) / 2;
 }
 
 /** @param {Context2D} pen @param {number} left @param {number} right @param {number} y */

@@ -80,11 +80,33 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     user.fill("#page-deliver .find", "ros")
     look("export with a refused frame name, some formats")
     user.keyboard.press("Escape")
+    page.load_sample(truth)
+    user.click("#tab-check")
+    user.locator(".sheet .crop").first.focus()
+    user.keyboard.press("r")
+    user.locator(".sheet .reviewed img[src]").wait_for()
+    look("contact sheet with a mark that was reviewed")
+    user.locator("[data-plot=residuals]").hover(position={"x": 200, "y": 40})
+    look("a bar under the pointer")
+    user.click("#tab-deliver")
+    for shown, selector in (("opencv", ".returns"), ("report", ".report"), ("rerun", ".text"), ("clicks", ".loader")):
+        user.click(f'#page-deliver [data-export="{shown}"]')
+        user.locator(f"#page-deliver {selector}").wait_for()
+        look(f"deliver {shown}")
+    page.value("import('/options/options.js').then(({ openOption }) => openOption('solving.camera_position'))")
+    user.locator("dialog[open]").wait_for()
+    look("the camera's position")
+    user.keyboard.press("Escape")
+    user.keyboard.press("Control+k")
+    user.keyboard.type("placement")
+    user.locator("#palette .entry").first.wait_for()
+    look("the palette with what was found")
+    user.keyboard.press("Escape")
     for width, height in ((1024, 700), (640, 700)):
         user.set_viewport_size({"width": width, "height": height})
         page.drawn()
         look(f"{width} px wide")
-    assert len(found) >= 28
+    assert len(found) >= 56
     assert {state: words for state, words in found.items() if words} == {}
 
 

@@ -338,12 +338,19 @@ def test_enlarged_the_page_has_the_whole_work_area(solved: Driver) -> None:
 
 
 @pytest.mark.slow
-def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
-    page.load_sample(truth, 4)
+def test_the_warnings_that_the_panel_counts_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
+    page.load_sample(truth, 12)
+    page.page.click("#menu-button")
+    page.page.click('#menu [data-action="options"]')
+    page.page.click('[data-method="paper"]')
+    page.until("__cocalib.state.view.method === 'paper'")
+    page.settle()
+    page.page.click("#sheet-close")
     page.page.click("#tab-deliver")
     page.until(f"document.querySelector('{DIALOG} .frames')")
-    warnings = page.page.locator(f"{DIALOG} .with-warnings li")
-    assert warnings.count() > len(page.view["warnings"]), "also the one that the verdict says"
+    expect(page.page.locator(f"{DIALOG} .with-warnings li")).to_have_count(len(page.view["warnings"]))
+    assert f"has {page.text('#warning-count')}" in page.text(f"{DIALOG} .with-warnings summary")
+    expect(page.page.locator(f"{DIALOG} .evidence")).to_contain_text(page.said(page.view["verdict"]["line"]))
     for row in page.view["warnings"]:
         expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(page.said(row["message"]))
 

@@ -13,6 +13,7 @@ from calib_core.results import Calibration
 from cocalib.web.port.server import RunningServer
 from cocalib.web.radar_sight import RadarSight
 from cocalib.workspace import Workspace
+from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser
@@ -68,6 +69,7 @@ def test_without_webgl_the_pane_says_so_and_shows_the_returns_from_above(
     assert page.page.get_attribute("#space-view", "src") is None
     page.until("__cocalib.state.placementsKnown")
     assert page.value("document.getElementById('birdseye').width") > 0
+    assert violations(page) == []
 
 
 def open_views(page: Driver) -> None:

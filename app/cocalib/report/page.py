@@ -69,7 +69,7 @@ def _what(subject: ReportSubject) -> Markup:
     on = None
     if subject.recording is not None:
         name = subject.recording.name
-        nothing = f", with {name}, in which there are no clicks or boxes to judge it by"
+        nothing = f", with {name}: without further clicks or boxes, judged by its own pairs"
         on = nothing if subject.judged is None else f", judged on {name}"
     known = tag("span", " (sha256 ", tag("code", f"{digest}…"), ")") if digest else None
     return tag("span", tag("b", subject.name), known, on)

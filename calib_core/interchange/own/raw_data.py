@@ -40,8 +40,8 @@ class OtherPose:
     @property
     def gain(self) -> str:
         """How far the camera is from there, and what the mean reprojection error becomes."""
-        before, after = self.aed_px
-        return f"the camera moves {self.moved_cm:.2g} cm, AED {before:.3g} -> {after:.3g} px"
+        before, after = (f"{aed_px:#.3g}".rstrip(".") for aed_px in self.aed_px)
+        return f"the camera moves {f'{self.moved_cm:#.2g}'.rstrip('.')} cm, AED {before} -> {after} px"
 
     @property
     def note(self) -> str:

@@ -12,7 +12,6 @@ from calib_core.interchange.format import PoseFor, imported
 from calib_core.interchange.formats.registry import format_named
 from calib_core.interchange.importing import read_any
 from calib_core.interchange.statement import missing_map
-from cocalib.view.model import WarningRow, warning_row
 from cocalib.view.wording import sentence
 from cocalib.web.exports import (
     CheckPointRow,
@@ -72,7 +71,6 @@ class ExportPreview:
         names_frames: the file holds frame names.
         evidence: what the pose rests on.
         missing: what the calibration has and this file cannot hold; "" if nothing.
-        warnings: of the calibration.
         other_pose: what the file could hold instead, for the other kind of radar data; None if nothing else.
         asks_despite_verdict: the calibration is contradictory: whoever saves it says so.
     """
@@ -95,7 +93,6 @@ class ExportPreview:
     names_frames: bool
     evidence: str
     missing: str
-    warnings: tuple[WarningRow, ...]
     other_pose: PoseChoice | None
     asks_despite_verdict: bool
 
@@ -169,7 +166,6 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         names_frames=report.imported.frames is not None,
         evidence=_evidence(file),
         missing=" ".join(map(sentence, lost)),
-        warnings=tuple(map(warning_row, file.calibration.warnings)),
         other_pose=PoseChoice(other.is_for, other.gain) if other else None,
         asks_despite_verdict=_asks_despite_verdict(file, key),
     )
