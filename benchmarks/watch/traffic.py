@@ -83,8 +83,8 @@ def judged(kind: str, seed: int, seconds: int, folder: Path | None) -> Judged:
 def resampled(kind: str, seed: int, seconds: int, folder: Path | None, hours: float) -> tuple[int, int, float]:
     """Draw whole passages where nothing turned; return the alarms, how many distinct passages there are, and the largest z.
 
-    A window has as many passages as one of the recording, drawn from all in the same third, none twice. Windows do not
-    overlap.
+    A window has as many passages as one of the recording, drawn from all in the same third, none twice: of each, what one
+    window saw of it. Windows do not overlap.
     """
     rng = np.random.default_rng([seed, 7])
     alarms, distinct, largest = 0, 0, 0.0
@@ -94,7 +94,7 @@ def resampled(kind: str, seed: int, seconds: int, folder: Path | None, hours: fl
             pieces, counts = part.pieces(window)
             for _ in range(round(hours * 3600.0 / _PARTS / window)):
                 drawn = rng.choice(len(pieces), counts[rng.integers(len(counts))], replace=False)
-                rows = [replace(pieces[one], passages=np.full(len(pieces[one]), own)) for own, one in enumerate(drawn)]
+                rows = [passage[rng.integers(len(passage))] for passage in (pieces[one] for one in drawn)]
                 turn = part.model.turn(TrafficRows.joined(rows)) if rows else None
                 z = 0.0 if turn is None else float(turn.least_z.max())
                 largest = max(largest, z)
@@ -125,12 +125,14 @@ class _Part:
         times_s = (rows.times_ns - self._start) / NS_PER_S
         return rows.some((times_s >= first_s) & (times_s < end_s))
 
-    def pieces(self, window_s: int) -> tuple[list[TrafficRows], np.ndarray]:
-        """Return the passages, cut at the ends of windows that share no second, and how many each window has."""
+    def pieces(self, window_s: int) -> tuple[list[list[TrafficRows]], np.ndarray]:
+        """Return each passage, cut at the ends of windows that share no second, and how many passages each window has."""
         window = (self.rows.times_ns - self._start) // (window_s * NS_PER_S)
-        keys, own = np.unique(np.stack([window, self.rows.passages], axis=1), axis=0, return_inverse=True)
-        pieces = [self.rows.some(own.reshape(-1) == one) for one in range(len(keys))]
-        return pieces, np.bincount(keys[:, 0], minlength=self._seconds // window_s)
+        keys, own = np.unique(np.stack([self.rows.passages, window], axis=1), axis=0, return_inverse=True)
+        pieces: dict[int, list[TrafficRows]] = {}
+        for one, passage in enumerate(keys[:, 0].tolist()):
+            pieces.setdefault(passage, []).append(self.rows.some(own.reshape(-1) == one))
+        return [*pieces.values()], np.bincount(keys[:, 1], minlength=self._seconds // window_s)
 
     def z(self, window_s: int) -> np.ndarray:
         """Return (n, 3) turns over their standard deviations, in windows that share no second; 0 for all in one."""

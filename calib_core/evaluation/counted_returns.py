@@ -738,6 +738,21 @@ def _in_one_frame(sightings: Sightings, table: BoxTable) -> tuple[Indices, Indic
     return np.concatenate(owns), np.concatenate(others)
 
 
+def boxes_in_bearing(matches: Matches, sightings: Sightings, table: BoxTable, camera: Camera) -> Indices:
+    """Return the box of each sighting (s,) where its bearing is the one that all share, else -1.
+
+    A match holds for the lives of a target and a box; for a while one of them may be somebody else's.
+    """
+    if matches.bearings is None:
+        return matches.boxes
+    meetings = _meetings(sightings, table, camera)
+    own = meetings.some(matches.boxes[meetings.sightings] == meetings.boxes)
+    own = own.some(own.misfits(matches.bearings) <= 1.0)
+    boxes = np.full(len(matches.boxes), -1)
+    boxes[own.sightings] = own.boxes
+    return boxes
+
+
 def _middles(table: BoxTable, camera: Camera) -> tuple[Values, Values]:
     """Return the bearing of each box's middle (b,) and half the angle that it covers (b,) [rad]."""
     last = np.array([camera.width_px - 1.0, camera.height_px - 1.0])

@@ -29,7 +29,6 @@ _SEARCHED_RAD = np.deg2rad(np.arange(-8.0, 8.01, 0.5))
 _FEWEST_RETURNS = 5
 _LEAST_SPREAD_RAD = np.deg2rad(0.1)  # of elevations, below which the radar measures none
 _FLOOR_RAD = np.deg2rad(0.03)
-_FEW_AZIMUTHS = 0.1  # different ones, as a share of the returns: a radar with bins
 _UNKNOWN_RAD = np.deg2rad(20.0)
 
 
@@ -107,9 +106,9 @@ def radar_turn(places: StillPlaces, scans: RadarScans) -> Turn | None:
 
 
 def _step(polar: Points3) -> float:
-    """Return the distance between the azimuths of a radar that reports bins [rad]; 0 for one that does not."""
+    """Return the distance between neighboring azimuths [rad]: that between bins, where a radar reports them; else very small."""
     sines = np.unique(np.round(np.sin(polar[:, 1]) * np.cos(polar[:, 2]), 3))
-    return float(np.median(np.diff(sines))) if 1 < len(sines) < _FEW_AZIMUTHS * len(polar) else 0.0
+    return float(np.median(np.diff(sines))) if len(sines) > 1 else 0.0
 
 
 def _still(scans: RadarScans) -> tuple[Points3, Indices, int]:

@@ -21,6 +21,7 @@ from calib_core.evaluation.counted_returns import (
     BoxTable,
     Matches,
     Sightings,
+    boxes_in_bearing,
     frame_scans,
     match_by_bearing,
     tracked_sightings,
@@ -120,7 +121,7 @@ def _frames(
     watched: Watched, sightings: Sightings, matches: Matches, table: BoxTable, scan_times_ns: TimesNs
 ) -> _Frames:
     """Return the boxes with a target: its sightings, and the stamp of the scan of each annotated frame (f,)."""
-    of_box = matches.boxes[sightings.of_return]
+    of_box = boxes_in_bearing(matches, sightings, table, watched.camera)[sightings.of_return]
     matched = np.flatnonzero(of_box >= 0)
     points = watched.camera_from_radar @ watched.radar_errors.corrected(sightings.points_radar_m[matched])
     camera, ahead = watched.camera, points[:, 2] > 1.0
@@ -253,11 +254,13 @@ _CHANGE_PRIOR_RAD = np.deg2rad(20.0)
 _CLOCK_CHANGE_PRIOR_S = 0.1
 _OWN = 4  # unknowns of the baseline beside one for each class
 _FEWEST_TO_LEARN = 6
-_ROUNDS, _USUAL_SIGMAS = 3, 2.0
+_ROUNDS = 3
+_USUAL_SIGMAS, _MISTAKEN_SIGMAS = 2.0, 5.0
+"""What is farther off counts less (Huber: 99 % efficient where errors are normal), and teaches no variance."""
 _UNKNOWN_CLASS = 4.0  # times the largest variance of a class that the baseline has
 _MOST_OF_A_PASSAGE = 8.0
-_USUAL_PASSAGE, _USUAL_PASSAGES = 0.5, 2.0
-"""What is expected of the variance of passages before any is seen, and with the weight of how many."""
+_USUAL_PASSAGE, _EXPECTED = 0.5, 2.0
+"""What is expected of the factor of passages before any is seen (that of a second is 1), with the weight of how many."""
 
 
 def starting_variances(rows: TrafficRows) -> tuple[Values, Values]:
@@ -379,13 +382,13 @@ def learned(rows: TrafficRows) -> TrafficModel:
     passages = [len(np.unique(rows.passages[classes == one])) for one in range(len(labels))]
     span_s = float(np.ptp(rows.times_ns)) / NS_PER_S if len(rows) else 0.0
     wider = np.ones(len(rows))
-    for _ in range(6):
+    for _ in range(2 * _ROUNDS):
         second, passage = _variances(factors, rows, classes)
         blocks, gradients = _by_passage(rows, design, wider * second, wider * passage)[1:]
         information, gradient = blocks.sum(axis=0), gradients.sum(axis=0)
         middle = np.linalg.solve(information + prior, gradient)
         residuals = rows.residuals_rad - design @ middle
-        usual = np.abs(residuals) < 5.0 * np.sqrt(second + passage)
+        usual = np.abs(residuals) < _MISTAKEN_SIGMAS * np.sqrt(second + passage)
         wider = _wider(residuals, second + passage)
         residuals = residuals / np.sqrt(wider)
         factors = np.array([
@@ -409,13 +412,13 @@ def _factors(rows: TrafficRows, residuals: Values, base: tuple[Values, Values], 
     second, passage = base[0][own], base[1][own]
     which, counts = np.unique(rows.passages[own], return_inverse=True, return_counts=True)[1:]
     means = np.bincount(which, residuals[own]) / counts
-    within = ((residuals[own] - means[which]) ** 2 / second).sum()
-    of_second = max(float(within) / max(len(own) - len(counts), 1), 0.02)
+    within = float(((residuals[own] - means[which]) ** 2 / second).sum())
+    of_second = (within + _EXPECTED) / (len(own) - len(counts) + _EXPECTED)
     noise = of_second * np.bincount(which, second) / counts**2
     excess = (means**2 - noise) / (np.bincount(which, passage) / counts)
     weights = np.minimum(counts, _MOST_OF_A_PASSAGE) / _MOST_OF_A_PASSAGE
-    usual = _USUAL_PASSAGE * _USUAL_PASSAGES
-    return of_second, (max(float(weights @ excess), 0.0) + usual) / (float(weights.sum()) + _USUAL_PASSAGES)
+    of_passage = max(float(weights @ excess), 0.0) + _USUAL_PASSAGE * _EXPECTED
+    return of_second, of_passage / (float(weights.sum()) + _EXPECTED)
 
 
 def _classes(rows: TrafficRows, labels: Sequence[str]) -> Indices:

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from calib_core.camera import Camera
-from calib_core.evaluation.counted_returns import Sightings, box_table, frame_scans, longest_gap_s, match_by_bearing
+from calib_core.evaluation.counted_returns import (
+    Sightings,
+    box_table,
+    boxes_in_bearing,
+    frame_scans,
+    longest_gap_s,
+    match_by_bearing,
+)
 from calib_core.measurements import NS_PER_S, Box, Boxes, Cuboid, FrameBoxes, TimeNs
 
 SCANS = np.array([0, 100, 200, 300, 700], dtype=np.int64) * 1_000_000
@@ -128,6 +135,20 @@ def test_a_target_far_from_the_cuboid_of_a_box_is_not_its_own():
 def test_parts_of_one_target_share_its_box():
     long_one = sightings((ACROSS, FAR), (ACROSS + 0.5, np.full(FRAMES, 23.0)))
     assert matched(long_one, boxes(ACROSS, width_px=60.0)) == {0: {"o0"}, 1: {"o0"}}
+
+
+def test_a_match_holds_for_a_life_and_a_bearing_for_a_frame():
+    astray = STILL.copy()
+    astray[30:36] += 12.0
+    found, table = sightings((ACROSS, FAR), (astray, FAR)), box_table(boxes(ACROSS, STILL))
+    matches = match_by_bearing(found, table, CAMERA)
+    in_bearing = boxes_in_bearing(matches, found, table, CAMERA)
+
+    assert (matches.boxes >= 0).all()
+    lost = np.flatnonzero(in_bearing < 0)
+    assert found.frames[lost].tolist() == [*range(30, 36)]
+    assert (found.targets[lost] == 1).all()
+    assert (in_bearing == matches.boxes).sum() == len(in_bearing) - 6
 
 
 def test_targets_that_follow_one_another_can_have_one_box():

@@ -13,14 +13,14 @@ from calib_core.measurements import RadarScans, TimeNs
 from calib_core.radar import RadarErrors
 from calib_core.watching.carrying import carried_forward
 from calib_core.watching.sentences import baseline_lines, json_line, verdict_lines
-from calib_core.watching.traffic import Watched
+from calib_core.watching.traffic import TrafficRows, Watched
 from calib_core.watching.watching import Stretch, Watch, baseline_of, stretches
 from calib_core.watching.witnesses import SeenTurn, Verdict
 from tests.street import CAMERA, TRUE_POSE, street
 from tests.unit.watching.test_still_image import CAMERA as SMALL
 from tests.unit.watching.test_still_image import scene, turned
 from tests.unit.watching.test_still_returns import scans as still_scans
-from tests.unit.watching.test_traffic import NS, traffic
+from tests.unit.watching.test_traffic import NS, crossing, traffic
 
 WATCHED = Watched(TRUE_POSE, SMALL, RadarErrors())
 
@@ -107,6 +107,24 @@ def test_a_change_of_the_clocks_offset_is_stated_where_it_is_known():
     assert len(stated) == 1
     assert len([*verdict_lines(unknown)]) == len([*verdict_lines(verdict)]) - 1
     assert json.loads(json_line(verdict, at=None))["traffic"]["images_late_s"] == {"change": -0.05, "sigma": 0.005}
+
+
+def test_a_change_of_the_clocks_offset_is_unknown_without_fast_traffic_both_ways():
+    rng = np.random.default_rng(12)
+    for rate, known in ((0.5, True), (0.06, False)):
+        before = crossing(rng, passages=60, late_s=0.0, rate=rate)
+        watch = Watch(
+            baseline_of([traffic_only(0, before)], calibration_sha256="a" * 64, recording="r", camera=SMALL), WATCHED
+        )
+        rows = crossing(rng, passages=12, late_s=0.03, rate=rate, start_s=600.0, first=100)
+        seen = watch.add(traffic_only(600, rows)).traffic
+        assert seen is not None
+        assert (seen.late_s is not None) == known
+
+
+def traffic_only(start_s: int, rows: TrafficRows) -> Stretch:
+    """Return a stretch with nothing but rows."""
+    return Stretch(TimeNs(start_s * NS), TimeNs((start_s + 30) * NS), None, RadarScans(), rows, False)
 
 
 def test_a_recording_without_anything_gives_no_baseline():
