@@ -1130,7 +1130,7 @@ export interface SnapWanted {
   image_time: Stamp;
   pixel_px: [number, number];
   id?: string | null;
-  over_dwell?: boolean;
+  near?: boolean;
   request?: number;
 }
 

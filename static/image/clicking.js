@@ -136,7 +136,7 @@ function hover(point) {
 
 /**
  * Place a mark in the frame on screen and select it; other marks of the frame stay. Where a proposal is shown, it goes to the apex that the
- * frames of the placement show next to it, if they do: one step, as the click is not placed before.
+ * frame shows next to it, if it does: one step, as the click is not placed before.
  * @param {number} u @param {number} v @param {{mark?: import("../messages.js").ClickRow["mark"], sigma_px?: number|null}} [how] clicked by a person, unless said otherwise
  */
 export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
@@ -152,7 +152,7 @@ export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   const offer = mark === "clicked" ? offers.shown() : null;
   draft(key, { u, v, image_time, mark });
   awaited = { index, known };
-  const { found } = offer ? await askApex({ image_time, pixel_px: [u, v], over_dwell: true }) : { found: null };
+  const { found } = offer ? await askApex({ image_time, pixel_px: [u, v], near: true }) : { found: null };
   if (found?.pixel_px) {
     [u, v] = found.pixel_px;
     [mark, sigma_px] = ["snapped", found.sigma_px];

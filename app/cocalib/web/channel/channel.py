@@ -172,14 +172,14 @@ class Channel:
             await doing
 
     async def _snap(self, wanted: SnapWanted) -> None:
-        """Search for an apex in one frame, or in those of its placement.
+        """Search for an apex around a mark, or next to a new click.
 
         Raises:
             CalibrationError: the frame cannot be read.
         """
         hub = self._hub
-        if wanted.over_dwell:
-            answer = await hub.proposing.averaged(wanted)
+        if wanted.near:
+            answer = await hub.proposing.apex_near(wanted)
         else:
             answer = await snapped(wanted, hub.moments, hub.frames, hub.executor)
         self.outbox.put(encode(answer))

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.proposing import DwellView, Proposal
-from calib_core.proposing.dwell_views import averaged_over_dwell
+from calib_core.proposing.apex import Apex, find_apex
 from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
 from cocalib.view.placement_states import SeenPlacements, Spots, is_dismissed, unmarked
@@ -27,6 +27,8 @@ from cocalib.web.messages.outgoing import (
 )
 from cocalib.workspace import Workspace
 
+_REACH, _LEAST_REACH_PX = 0.1, 4.0
+"""How far from a click an apex is still what was clicked: in widths of the reflector, and at least."""
 _SHORTEST_S = 2.0
 """A target that stands still for less is not looked for in the images."""
 _GROWING = (
@@ -101,8 +103,8 @@ class ProposingService:
         )
         self._job.ask(ProposingWish(camera, session.options, self._placements, session.clicks, gone))
 
-    async def averaged(self, wanted: SnapWanted) -> Snapped:
-        """Average a click over the frames of its placement, off the event loop.
+    async def apex_near(self, wanted: SnapWanted) -> Snapped:
+        """Search for the apex next to a click, no larger than the reflector of its placement, off the event loop.
 
         Args:
             wanted: by a page, for a click that is not placed yet.
@@ -110,20 +112,21 @@ class ProposingService:
         Raises:
             CalibrationError: the clicked frame cannot be read.
         """
-        return await asyncio.to_thread(self._averaged, wanted)
+        return await asyncio.to_thread(self._apex_near, wanted)
 
-    def _averaged(self, wanted: SnapWanted) -> Snapped:
+    def _apex_near(self, wanted: SnapWanted) -> Snapped:
         pixel_px = np.array(wanted.pixel_px)
         frame = self._workspace.facts.frame_at(wanted.image_time)
         view = view_at(wanted.image_time, pixel_px, self._job.snapshot.views)
         if frame is None or view is None:
             return Snapped(None, None, "The images of this placement were not looked at.", wanted.id)
-        average = averaged_over_dwell(view, self._recording, frame, pixel_px)
-        if average is None:
-            return Snapped(None, None, "The images of this placement show no apex there.", wanted.id)
-        column, row = (float(value) for value in average.pixel_px)
-        words = f"Averaged over {average.frames} frames, with a standard deviation of {average.sigma_px:.2f} px."
-        return Snapped((column, row), average.sigma_px, words, wanted.id)
+        reach_px = max(_LEAST_REACH_PX, _REACH * view.width_px)
+        apex = find_apex(self._recording.image(frame), pixel_px, reach_px=reach_px, size_px=view.width_px)
+        if not isinstance(apex, Apex):
+            return Snapped(None, None, "The image shows no apex there.", wanted.id)
+        column, row = (float(value) for value in apex.pixel_px)
+        words = f"At the reflector's apex, with a standard deviation of {apex.sigma_px:.2f} px."
+        return Snapped((column, row), apex.sigma_px, words, wanted.id)
 
     def switch(self, switch: ProposingSwitch) -> None:
         """Propose, or propose nothing any more."""

@@ -104,13 +104,13 @@ class SnapWanted(_Request, frozen=True, tag="snap_wanted"):
         image_time: stamp of the frame.
         pixel_px: column and row.
         id: of the click that stands there; None for the keyboard's cross, and for a new click.
-        over_dwell: whether to average it over the frames of the placement, near the pixel.
+        near: whether it lies next to the pixel, as that of a new click where a proposal is shown.
     """
 
     image_time: TimeNs
     pixel_px: tuple[float, float]
     id: Id | None = None
-    over_dwell: bool = False
+    near: bool = False
 
 
 class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "content_base64"}):

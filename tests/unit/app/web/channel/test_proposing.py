@@ -121,24 +121,24 @@ def test_a_place_that_carries_a_mark_is_not_offered(workspace):
     at_desk(workspace, visit)
 
 
-def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeypatch):
+def test_a_click_goes_to_the_apex_next_to_it(workspace, monkeypatch):
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
     monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, Proposals(())))
     time = views[1].image_time
 
     async def visit(desk: ProposingService, told: list[Any]) -> None:
-        early = await desk.averaged(SnapWanted(time, (31.0, 25.0), over_dwell=True))
+        early = await desk.apex_near(SnapWanted(time, (31.0, 25.0), near=True))
         assert (early.pixel_px, "not looked at" in early.words) == (None, True)
         desk.surveyed(PLACEMENTS)
         await until(told, lambda one: one.progress.stage == "ready")
-        found = await desk.averaged(SnapWanted(time, (31.5, 25.0), over_dwell=True))
+        found = await desk.apex_near(SnapWanted(time, (31.5, 25.0), near=True))
         assert found.pixel_px == pytest.approx((30.0, 24.0), abs=0.3)
         assert found.sigma_px is not None
         assert f"{found.sigma_px:.2f} px" in found.words
-        missed = await desk.averaged(SnapWanted(time, (8.0, 8.0), over_dwell=True))
+        missed = await desk.apex_near(SnapWanted(time, (8.0, 8.0), near=True))
         assert missed.pixel_px is None
         assert "no apex" in missed.words
-        between = await desk.averaged(SnapWanted(TimeNs(time + 1), (31.0, 25.0), over_dwell=True))
+        between = await desk.apex_near(SnapWanted(TimeNs(time + 1), (31.0, 25.0), near=True))
         assert between.pixel_px is None
         assert not workspace.session.clicks
 

@@ -64,6 +64,6 @@ def test_the_message_of_a_page_is_understood_and_answered_by_its_type():
     incoming = parse(text)
     assert incoming.command == SnapWanted(TimeNs(1_000_000_005), (3.5, 4.0), None)
     assert incoming.request == 7
-    over_dwell = parse(text.replace('"id":null', '"over_dwell":true')).command
-    assert over_dwell == SnapWanted(TimeNs(1_000_000_005), (3.5, 4.0), None, over_dwell=True)
+    near = parse(text.replace('"id":null', '"near":true')).command
+    assert near == SnapWanted(TimeNs(1_000_000_005), (3.5, 4.0), None, near=True)
     assert encode(Snapped(None, None, "No corner found.")).startswith('{"type":"snapped","pixel_px":null')
