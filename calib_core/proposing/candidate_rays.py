@@ -34,10 +34,8 @@ _CLICKED = 0.5
 _LEAST_SIGMA_PX = 1.0
 _REPEATED_PX = 6.0
 """Candidates of two dwells nearer than this show the same place; what moved does not stay there."""
-_REPEATED_SHARE, _GATHERED_SHARE = 0.3, 0.4
-"""Shares of the wrong candidates that lie where other dwells have one too, and near to where they gather."""
-_GATHERED = 0.05
-"""Width of such a gathering over that of the image."""
+_REPEATED_SHARE = 0.3
+"""Share of the wrong candidates that lie where other dwells have one too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,14 +252,12 @@ def apart_in_time(views: Sequence[DwellView]) -> Flags:
 def _density(pixels: np.ndarray, odds: Points2, apart: Flags, camera: Camera) -> Points2:
     """Return how densely wrong candidates lie around each candidate (n, k) [1 / px^2].
 
-    They are spread evenly, gather where dwells are, as in an aisle, and repeat themselves where something flickers.
+    They are spread evenly, and repeat themselves where something flickers.
     """
     n, k = odds.shape
     squared = ((pixels[:, :, None, None] - pixels[None, None]) ** 2).sum(axis=-1)
     others = (apart[:, None, :, None] & (odds > 0.0)[None, None]).reshape(n, 1, n, k)
-    counted = np.maximum(others.sum(axis=(2, 3)), 1)
-    density = np.full((n, k), (1.0 - _REPEATED_SHARE - _GATHERED_SHARE) / (camera.width_px * camera.height_px))
-    for share, width_px in ((_REPEATED_SHARE, _REPEATED_PX), (_GATHERED_SHARE, _GATHERED * camera.width_px)):
-        kernels = np.exp(-0.5 * squared / width_px**2) / (2.0 * np.pi * width_px**2)
-        density += share * (kernels * others).sum(axis=(2, 3)) / counted
-    return density
+    kernels = np.exp(-0.5 * squared / _REPEATED_PX**2) / (2.0 * np.pi * _REPEATED_PX**2)
+    repeated = (kernels * others).sum(axis=(2, 3)) / np.maximum(others.sum(axis=(2, 3)), 1)
+    evenly = (1.0 - _REPEATED_SHARE) / (camera.width_px * camera.height_px)
+    return np.asarray(evenly + _REPEATED_SHARE * repeated)
