@@ -55,11 +55,9 @@ _PARTS: dict[str, dict[str, Any]] = {
     "light that changes in parts": {"dwell_views.local_light": lambda image, _: np.ones_like(image[..., :1])},
     "a still for each set of placements": {"dwell_views.still_images": _one_still},
     "apexes of candidates": {"dwell_views.with_seen_apexes": lambda view, _: view},
-    "odds of an apex": {"candidate_rays._APEX": 0.0, "apex_refinement._APEX_GAIN": 1.0},
-    "places that repeat or gather": {"candidate_rays._REPEATED_SHARE": 0.0, "candidate_rays._GATHERED_SHARE": 0.0},
-    "echoes that pull aside": {"pose_agreement._WIDE_SHARE": 0.0},
+    "odds of an apex": {"candidate_rays._APEX": 0.0, "image_candidates._APEX_GAIN": 1.0},
+    "places that repeat": {"candidate_rays._REPEATED_SHARE": 0.0},
     "levels of noise": {"pose_agreement.NOISE_LEVELS": (1.0,)},
-    "heights of the camera": {"mounting_prior._HEIGHTS_M": (0.8,)},
     "confidence that is tempered": {"proposing._TEMPER": 1.0},
     "places that others take": {"proposing._taken_by_others": lambda _, rays, __: rays.odds < 0.0},
     "people told by their echo": {"proposing.reflector_log_odds": lambda *_, **__: np.inf},
@@ -67,7 +65,7 @@ _PARTS: dict[str, dict[str, Any]] = {
     "a look finer than a pixel": {"appearance._FINER": 1.0},
 }
 """Names, and what stands for each part in modules of `calib_core.proposing`."""
-_OF_IMAGES = ("dwell_views.", "apex_refinement.", "image_candidates.", "still_images.")
+_OF_IMAGES = ("dwell_views.", "image_candidates.", "still_images.")
 _PLACEMENTS = 10
 _SURE = 0.9
 _BOARD_M = 0.3

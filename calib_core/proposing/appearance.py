@@ -8,9 +8,8 @@ import numpy as np
 from calib_core.arrays import Vector2, freeze
 from calib_core.camera import Camera
 from calib_core.proposing.apex import Apex, find_apex
-from calib_core.proposing.apex_refinement import full_image
 from calib_core.proposing.dwell_views import DwellView, width_seen_px, with_blobs
-from calib_core.proposing.image_candidates import ImageCandidate
+from calib_core.proposing.image_candidates import ImageCandidate, full_image
 from calib_core.proposing.still_images import FrameSource
 
 _HALF = 0.75

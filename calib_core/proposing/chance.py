@@ -17,8 +17,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import apart_in_time, candidate_rays
 from calib_core.proposing.dwell_views import DwellView, with_blobs, with_seen_apexes
 from calib_core.proposing.image_candidates import ImageCandidate
-from calib_core.proposing.mounting_prior import mounting_prior
-from calib_core.proposing.pose_agreement import refined_poses, rotation_consensus
+from calib_core.proposing.pose_agreement import mounting_prior, refined_poses, rotation_consensus
 from calib_core.proposing.still_images import FrameSource
 
 OTHER_WIDTHS = (0.71, 1.41, 2.0, 2.83)
@@ -38,7 +37,7 @@ _SAMPLED = 1.1
 """How much wider the spread is where there are more deals than are compared, so that it is an estimate: quantile of Student's
 distribution with 39 degrees of freedom at one case in 300, over the normal one, times sqrt(41 / 39)."""
 _TRIED, _REFINED = 400, 2
-"""Rotations that are compared about each start, and how many of them are refined: only the score counts."""
+"""Rotations that are compared, and how many of them are refined: only the score counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,7 @@ from calib_core.arrays import Indices, Values, Vector2, freeze
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import TimeNs
-from calib_core.proposing.apex_refinement import full_image, with_apexes
-from calib_core.proposing.image_candidates import ImageCandidate, blobs
+from calib_core.proposing.image_candidates import ImageCandidate, blobs, full_image, with_apexes
 from calib_core.proposing.still_images import (
     FrameSource,
     StillImage,

@@ -14,16 +14,72 @@ A person who goes from place to place is seen by the radar and in the images ali
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, Values, freeze
-from calib_core.geometry import RigidTransform, rotation_exp, skews
+from calib_core.arrays import Flags, Indices, Matrix33, Points2, Points3, Values, Vector3, freeze
+from calib_core.geometry import RigidTransform, mounting_rotation, rotation_exp, skews
+from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays
 from calib_core.proposing.dwell_views import DwellView
-from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
+
+_MOST_TURNED_RAD = float(np.radians(26.0))
+"""Largest rotation away from the nominal mounting."""
+_TURNED_SIGMA_RAD = np.radians(9.0)
+_LEVER_SIGMA_M = 0.25
+"""Standard deviation per axis of the camera's position about the radar's, if nobody measured it."""
+_HEIGHT_M = 0.8
+"""Height of the camera above the plane of the placements from which a radar that measures no elevation starts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MountingPrior:
+    """What is known of the pose before any dwell.
+
+    Attributes:
+        rotation: (3, 3) camera from radar, nominal.
+        rotation_sigma_rad: per axis.
+        centre_radar_m: (3,) the camera's position.
+        centre_sigma_m: (3,) per radar axis.
+        start_m: (3,) the camera's position to start from.
+        scale_sigma: (2,) of the scales of azimuth and elevation.
+    """
+
+    rotation: Matrix33
+    rotation_sigma_rad: float
+    centre_radar_m: Vector3
+    centre_sigma_m: Vector3
+    start_m: Vector3
+    scale_sigma: Values
+
+    def __post_init__(self) -> None:
+        freeze(self, rotation=(3, 3), centre_radar_m=(3,), centre_sigma_m=(3,), start_m=(3,), scale_sigma=(2,))
+
+
+def mounting_prior(options: CalibrationOptions, *, is_flat: bool) -> MountingPrior:
+    """Return the prior of the mounting that the options state.
+
+    Args:
+        options: nominal angles, measured position, scale errors of the radar.
+        is_flat: the radar measures no elevation, so that its height above the placements is open.
+    """
+    measured = options.solving.camera_position
+    centre = np.zeros(3) if measured is None else np.array(measured.position_m)
+    sigma = np.full(3, _LEVER_SIGMA_M if measured is None else max(measured.sigma_m, 0.02))
+    start = centre
+    if is_flat:
+        sigma = np.array([sigma[0], sigma[1], np.hypot(sigma[2], options.radar.height_sigma_m)])
+        start = centre + np.array([0.0, 0.0, _HEIGHT_M])
+    return MountingPrior(
+        rotation=mounting_rotation(*astuple(options.mounting)),
+        rotation_sigma_rad=float(_TURNED_SIGMA_RAD),
+        centre_radar_m=centre,
+        centre_sigma_m=sigma,
+        start_m=start,
+        scale_sigma=np.maximum([options.radar.azimuth_scale_sigma, options.radar.elevation_scale_sigma], 1e-4),
+    )
+
 
 NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Factors on the stated standard deviations of the radar's angles, in the order in which they are tried."""
@@ -60,12 +116,6 @@ class RoughPoses:
     def __len__(self) -> int:
         return len(self.scores)
 
-    @classmethod
-    def of_rotations(cls, rotations: np.ndarray, centres_radar_m: np.ndarray, scores: Values, tried: int) -> Self:
-        """Take rotations as they are, with right scales and the stated noise."""
-        m = len(scores)
-        return cls(rotations, centres_radar_m, np.zeros((m, 2)), np.ones(m), scores, tried)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expectation:
@@ -75,8 +125,7 @@ class Expectation:
         off_rad: (m, n, k, 2) prediction minus candidate, across its ray.
         jacobian: (m, n, k, 2, 8) of it by rotation, camera position and scales.
         covariance: (m, n, k, 2, 2) of it by the noise of radar and image.
-        probability: (m, n, k) that the candidate is the reflector, given the pose.
-        weight: (m, n, k) of its offset in a fit: the probability, less for what lies aside.
+        probability: (m, n, k) that the candidate is the reflector, given the pose; the weight of its offset in a fit.
         log_odds: (m, d) of each dwell over chance.
     """
 
@@ -84,7 +133,6 @@ class Expectation:
     jacobian: np.ndarray
     covariance: np.ndarray
     probability: np.ndarray
-    weight: np.ndarray
     log_odds: np.ndarray
 
 
@@ -189,7 +237,7 @@ def _judged_by_others(rays: CandidateRays, prior: MountingPrior, pose: RoughPose
     seen = expectation(rays, pose)
     off_rad, jacobian, covariance = seen.off_rad[0], seen.jacobian[0], seen.covariance[0]
     information = normal_equations(rays, prior, pose)[0][0]
-    weight = inverse(covariance) * seen.weight[0][..., None, None]
+    weight = inverse(covariance) * seen.probability[0][..., None, None]
     own = np.add.reduceat(np.einsum("nkap,nkab,nkbq->npq", jacobian, weight, jacobian), rays.first)
     pull = np.add.reduceat(np.einsum("nkap,nkab,nkb->np", jacobian, weight, off_rad), rays.first)
     without = np.linalg.inv(information - own)
@@ -198,7 +246,7 @@ def _judged_by_others(rays: CandidateRays, prior: MountingPrior, pose: RoughPose
     without, shift = np.repeat(without, counts, axis=0), np.repeat(shift, counts, axis=0)
     off_rad = off_rad + np.einsum("nkap,np->nka", jacobian, shift)
     covariance = covariance + np.einsum("nkap,npq,nkbq->nkab", jacobian, without, jacobian)
-    gain = rays.of_dwells(sum(densities(off_rad, covariance)) * rays.odds / rays.density)
+    gain = rays.of_dwells(density(off_rad, covariance) * rays.odds / rays.density)
     squared = np.einsum("nka,nkab,nkb->nk", off_rad, inverse(covariance), off_rad)
     probability = gain / (rays.missing + gain.sum(axis=1))[:, None]
     return probability, np.sqrt(np.maximum(np.minimum.reduceat(squared, rays.first), 0.0))
@@ -242,39 +290,30 @@ def rotation_consensus(
         rays: of all dwells.
         prior: of the mounting.
         most: how many to return.
-        tried: how many to compare at most, about each start.
+        tried: how many to compare at most.
         seed: of the choice of two-dwell rotations where there are too many to try all.
     """
-    found = [
-        (centre, _from_two_dwells(rays, prior, centre, tried, np.random.default_rng(seed))) for centre in prior.starts_m
-    ]
-    apart = []
-    for (centre, rotations), scores in zip(found, _rotation_scores(rays, prior, found), strict=True):
-        kept = _best_apart(rotations, scores, most)
-        apart.append((rotations[kept], np.tile(centre, (len(kept), 1)), scores[kept]))
-    rotations, centres, scores = (np.concatenate(each) for each in zip(*apart, strict=True))
-    order = np.argsort(-scores, kind="stable")[:most]
-    compared = sum(len(rotations) for _, rotations in found)
-    return RoughPoses.of_rotations(rotations[order], centres[order], scores[order], compared)
-
-
-def _directions(rays: CandidateRays, centre: np.ndarray) -> np.ndarray:
-    away = rays.positions_radar_m - centre
-    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6))
+    away = rays.positions_radar_m - prior.start_m
+    directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+    rotations = _from_two_dwells(rays, prior, directions, tried, np.random.default_rng(seed))
+    scores = _rotation_scores(rays, prior, directions, rotations)
+    kept = _best_apart(rotations, scores, most)
+    m = len(kept)
+    centres = np.tile(prior.start_m, (m, 1))
+    return RoughPoses(rotations[kept], centres, np.zeros((m, 2)), np.ones(m), scores[kept], len(rotations))
 
 
 def _from_two_dwells(
-    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, tried: int, rng: np.random.Generator
+    rays: CandidateRays, prior: MountingPrior, directions: Points3, tried: int, rng: np.random.Generator
 ) -> np.ndarray:
     """Return the rotations (h, 3, 3) that two candidates of two dwells give, those within the mounting's reach."""
-    directions = _directions(rays, centre)
     dwell, which = np.nonzero(rays.odds > 0.0)
     if len(dwell) > _MOST_PAIRED:
         odds = rays.odds[dwell, which]
         drawn = np.sort(rng.choice(len(dwell), _MOST_PAIRED, replace=False, p=odds / odds.sum()))
         dwell, which = dwell[drawn], which[drawn]
     seen, thought = rays.rays[dwell, which], directions[dwell]
-    within = np.flatnonzero((seen * (thought @ prior.rotation.T)).sum(axis=1) > np.cos(MOST_TURNED_RAD))
+    within = np.flatnonzero((seen * (thought @ prior.rotation.T)).sum(axis=1) > np.cos(_MOST_TURNED_RAD))
     dwell, which, seen, thought = dwell[within], which[within], seen[within], thought[within]
     apart_rad = np.arccos(np.clip(directions @ directions.T, -1.0, 1.0))[dwell[:, None], dwell]
     seen_rad = np.arccos(np.clip(seen @ seen.T, -1.0, 1.0))
@@ -286,7 +325,7 @@ def _from_two_dwells(
     )
     one, other = np.nonzero(np.triu(agree, 1))
     rotations = _frames(seen[one], seen[other]) @ np.swapaxes(_frames(thought[one], thought[other]), 1, 2)
-    near = np.flatnonzero(_turned_cosine(rotations, prior.rotation) > np.cos(MOST_TURNED_RAD))
+    near = np.flatnonzero(_turned_cosine(rotations, prior.rotation) > np.cos(_MOST_TURNED_RAD))
     most = min(tried, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
     if len(near) > most:
         odds = rays.odds[dwell, which]
@@ -308,10 +347,8 @@ def _frames(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.stack([middle, across, np.cross(middle, across)], axis=-1)
 
 
-def _rotation_scores(
-    rays: CandidateRays, prior: MountingPrior, by_start: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> list[Values]:
-    """Return the log-odds (h,) of rotations (h, 3, 3) over chance, with tolerances that do not depend on them, at each start."""
+def _rotation_scores(rays: CandidateRays, prior: MountingPrior, directions: Points3, rotations: np.ndarray) -> Values:
+    """Return the log-odds (h,) of rotations (h, 3, 3) over chance, with tolerances that do not depend on them."""
     scaled = rays.slopes * rays.sigma_polar[:, None, :] / np.maximum(rays.polar[:, 0], 1e-3)[:, None, None]
     across = rays.tangents @ (prior.rotation @ scaled)[:, None] * _ROUGH
     lever_rad = _LEVER_M / np.maximum(rays.polar[:, 0], 0.3)
@@ -322,15 +359,11 @@ def _rotation_scores(
     n, k = rays.odds.shape
     axes = np.concatenate([rays.rays[:, :, None], whitening @ rays.tangents], axis=2)
     axes = axes.transpose(0, 3, 2, 1).reshape(n, 3, 3 * k)
-    scores = []
-    for centre, rotations in by_start:
-        turned = (rotations @ _directions(rays, centre).T).transpose(2, 0, 1)
-        forward, right, down = np.split(turned @ axes, 3, axis=-1)
-        near = np.where(forward > 0.5, np.exp(-0.5 * (right**2 + down**2)), 0.0)
-        scores.append(
-            np.log(rays.missing + rays.of_dwells((near @ gain[..., None])[..., 0].T[..., None])[..., 0]).sum(axis=1)
-        )
-    return scores
+    turned = (rotations @ directions.T).transpose(2, 0, 1)
+    forward, right, down = np.split(turned @ axes, 3, axis=-1)
+    near = np.where(forward > 0.5, np.exp(-0.5 * (right**2 + down**2)), 0.0)
+    summed = rays.of_dwells((near @ gain[..., None])[..., 0].T[..., None])[..., 0]
+    return np.asarray(np.log(rays.missing + summed).sum(axis=1))
 
 
 def _best_apart(rotations: np.ndarray, scores: Values, most: int) -> Indices:
@@ -352,9 +385,6 @@ _FREE = 6.0
 """Parameters that a fit adapts to noise: that much a smaller noise level gains by chance, times its logarithm."""
 
 _STEPS = 3
-
-_WIDE, _WIDE_SHARE = 3.0, 0.15
-"""Factor on all standard deviations of a dwell that another echo pulls aside, and the share of such dwells."""
 
 _LEAST_FORWARD = 0.3
 """Cosine of the angle between a predicted and a seen direction below which they have nothing to do with each other."""
@@ -397,21 +427,15 @@ def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:
     factor = np.stack([np.ones_like(poses.noise), poses.noise, poses.noise], axis=-1)
     across = by_polar * (rays.sigma_polar * factor[:, None])[:, :, None, None]
     covariance = across @ np.swapaxes(across, -1, -2) + (rays.sigma_rad**2)[..., None, None] * np.eye(2)
-    near, wide = densities(off_rad, covariance)
-    odds = np.where(forward > _LEAST_FORWARD, rays.odds / rays.density, 0.0)
-    gain = (near + wide) * odds
+    gain = density(off_rad, covariance) * np.where(forward > _LEAST_FORWARD, rays.odds / rays.density, 0.0)
     total = rays.missing + rays.of_dwells(gain).sum(axis=-1)
-    over = rays.of_positions(total)[..., None]
-    weight = (near + wide / _WIDE**2) * odds / over
-    return Expectation(off_rad, jacobian, covariance, gain / over, weight, np.log(total))
+    return Expectation(off_rad, jacobian, covariance, gain / rays.of_positions(total)[..., None], np.log(total))
 
 
-def densities(off: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the density (...) of offsets (..., 2) with covariances (..., 2, 2): of the usual, and of those pulled aside."""
+def density(off: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Return the density (...) of offsets (..., 2) with covariances (..., 2, 2)."""
     squared = (off * (inverse(covariance) @ off[..., None])[..., 0]).sum(axis=-1)
-    height = 1.0 / (2.0 * np.pi * np.sqrt(_determinant(covariance)))
-    wide = _WIDE_SHARE / _WIDE**2 * height * np.exp(-0.5 / _WIDE**2 * squared)
-    return (1.0 - _WIDE_SHARE) * height * np.exp(-0.5 * squared), wide
+    return np.asarray(np.exp(-0.5 * squared) / (2.0 * np.pi * np.sqrt(_determinant(covariance))))
 
 
 def inverse(matrices: np.ndarray) -> np.ndarray:
@@ -427,7 +451,7 @@ def _determinant(matrices: np.ndarray) -> np.ndarray:
 def normal_equations(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> tuple[np.ndarray, np.ndarray]:
     """Return the information (m, 8, 8) of the dwells and the prior, and the gradient (m, 8) of the log-probability."""
     seen = expectation(rays, poses)
-    weighted = (inverse(seen.covariance) * seen.weight[..., None, None]) @ seen.jacobian
+    weighted = (inverse(seen.covariance) * seen.probability[..., None, None]) @ seen.jacobian
     m = len(poses)
     rows = seen.jacobian.reshape(m, -1, 8)
     information = np.swapaxes(rows, 1, 2) @ weighted.reshape(m, -1, 8)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from calib_core.arrays import Vector2, freeze
 from calib_core.association.placements import Placement
 from calib_core.input_files import encodable
 from calib_core.interchange.own.documents import ClickDocument, finite_or_none
 from calib_core.interchange.own.proposal_documents import (
-    PROPOSALS_SCHEMA,
     DwellDocument,
     ImageCandidateDocument,
     ProposalDocument,
@@ -86,25 +86,6 @@ class Proposals:
     slips: tuple[Slip, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class ProposalSource:
-    """What proposals were made from.
-
-    Attributes:
-        recording: names of its files.
-        image_topic: of the images.
-        radar_topics: of the radar.
-        reflector_m: the width that was looked for.
-        confirmed: ids of the clicks that a person confirmed before.
-    """
-
-    recording: tuple[str, ...]
-    image_topic: str | None
-    radar_topics: tuple[str, ...]
-    reflector_m: float
-    confirmed: tuple[str, ...] = ()
-
-
 def named_proposals(
     proposals: Proposals, views: Sequence[DwellView], taken: Sequence[str] = ()
 ) -> tuple[tuple[str, Proposal], ...]:
@@ -115,35 +96,26 @@ def named_proposals(
         views: of all placements.
         taken: ids of clicks that exist already.
     """
-    number = {_key(view.placement): count for count, view in enumerate(views, start=1)}
+    number = {view.placement: count for count, view in enumerate(views, start=1)}
     named = []
     for proposal in proposals.ranked:
-        name = f"p{number[_key(proposal.placement)]}"
+        name = f"p{number[proposal.placement]}"
         while name in taken:
             name += "-proposed"
         named.append((name, proposal))
     return tuple(named)
 
 
-def _key(placement: Placement) -> tuple[int, int, tuple[float, ...]]:
-    return int(placement.start), int(placement.end), tuple(placement.position_radar_m.tolist())
-
-
-def proposals_json(proposals: Proposals, views: Sequence[DwellView], source: ProposalSource) -> str:
+def proposals_json(proposals: Proposals, views: Sequence[DwellView], source: ProposalsDocument) -> str:
     """Write proposals-1 text; the same proposals give the same bytes.
 
     Args:
         proposals: of these views.
         views: of all placements of a recording.
-        source: what they were made from.
+        source: what they were made from; the rest of it is filled in.
     """
-    document = ProposalsDocument(
-        schema=PROPOSALS_SCHEMA,
-        recording=list(source.recording),
-        image_topic=source.image_topic,
-        radar_topics=list(source.radar_topics),
-        reflector_m=source.reflector_m,
-        confirmed=list(source.confirmed),
+    document = replace(
+        source,
         proposals=[_proposal(name, one) for name, one in named_proposals(proposals, views, source.confirmed)],
         unproposed=[UnproposedDocument(_dwell(placement), reason) for placement, reason in proposals.unproposed],
         camera_from_radar=None if proposals.agreement is None else _mounting(proposals.agreement),

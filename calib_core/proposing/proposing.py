@@ -14,9 +14,9 @@ from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays
 from calib_core.proposing.chance import Chance, chance_of
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.image_candidates import ImageCandidate
-from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     PoseAgreement,
+    mounting_prior,
     pose_agreement,
     reflector_log_odds,
 )
@@ -230,11 +230,8 @@ class _Judged:
         ranked = np.sort(self.agreement.probability[i])[::-1]
         if len(ranked) > 1 and ranked[1] > 0.5 * ranked[0]:
             return _TWO_PLACES
-        return _UNLIKELY if self.trusted >= _UNSURE else self._of_pose()
-
-    def _of_pose(self) -> str:
-        certain = self.agreement is not None and self.agreement.pose_probability >= _WEAK
-        return _CHANCE if certain else _TWO_POSES
+        of_pose = _CHANCE if self.agreement.pose_probability >= _WEAK else _TWO_POSES
+        return _UNLIKELY if self.trusted >= _UNSURE else of_pose
 
     def _without_pose(self) -> str:
         if (self.rays.click >= 0).any():

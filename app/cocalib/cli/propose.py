@@ -9,10 +9,11 @@ import numpy as np
 
 from calib_core.association.placements import Placement
 from calib_core.input_files import name_text
+from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.proposing import DwellView, Proposals
-from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
+from calib_core.proposing.proposals import named_proposals, proposals_json
 from calib_core.recordings import Recording, table_lines
 from calib_core.words.warnings import probability_text
 from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices
@@ -98,12 +99,15 @@ def _deliver(
             file=sys.stderr,
         )
     confirmed = tuple(click.id for click in clicks if click.counts)
-    source = ProposalSource(
-        recording=tuple(name_text(path.name) for path in recording.paths),
+    source = ProposalsDocument(
+        schema=PROPOSALS_SCHEMA,
+        recording=[name_text(path.name) for path in recording.paths],
         image_topic=recording.image_topic,
-        radar_topics=recording.radar_topics,
+        radar_topics=list(recording.radar_topics),
         reflector_m=reflector_m if proposals.chance is None else reflector_m * proposals.chance.wider,
-        confirmed=confirmed,
+        confirmed=list(confirmed),
+        proposals=[],
+        unproposed=[],
     )
     text = proposals_json(proposals, views, source)
     if shown.json:

@@ -9,9 +9,9 @@ from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.proposing import DwellView, proposals_of
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays
-from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import (
     PoseAgreement,
+    mounting_prior,
     pose_agreement,
     rotation_consensus,
 )
