@@ -89,6 +89,8 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     user.locator("[data-plot=residuals]").hover(position={"x": 200, "y": 40})
     look("a bar under the pointer")
     user.click("#tab-deliver")
+    user.fill("#page-deliver .find", "")
+    user.fill("#page-deliver [data-field=radar_frame]", "radar")
     for shown, selector in (("opencv", ".returns"), ("report", ".report"), ("rerun", ".text"), ("clicks", ".loader")):
         user.click(f'#page-deliver [data-export="{shown}"]')
         user.locator(f"#page-deliver {selector}").wait_for()

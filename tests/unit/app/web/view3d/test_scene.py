@@ -262,6 +262,7 @@ def test_the_image_in_the_frustum_is_an_outline_where_it_would_hide_a_placement(
         ((-6.0, 0.0, 0.0), None),
         ((-6.0, 0.0, 9.0), b"jpeg"),
         ((-6.0, 0.0, 0.1), None),
+        ((-6.0, 0.0, 0.3), None),
         ((9.0, 0.0, 0.0), b"jpeg"),
     ):
         drawn.camera.position = viewer_m
