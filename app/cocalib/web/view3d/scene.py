@@ -237,7 +237,7 @@ class TabScene:
 
     def _show_image(self) -> None:
         """Show the image in the frustum, or its outline alone where it would hide a placement from the viewer."""
-        high = 2.0 * np.tan(self._frustum.fov / 2.0)  # at a distance of 1; of viser's own sizes, only the last is scaled as drawn
+        high = 2.0 * np.tan(self._frustum.fov / 2.0)  # away by 1; viser's own is not as drawn
         away_m = np.multiply(self._frustum.scale, self._frustum.compute_canonical_frustum_size()[2])
         size = away_m * np.array([high * self._frustum.aspect, high, 1.0])
         viewer = self._camera_from_radar @ np.array(self._client.camera.position)
