@@ -143,5 +143,5 @@ def _candidates(
 def _view(number: int, position_m: np.ndarray, snr_db: float, candidates: tuple[ImageCandidate, ...]) -> DwellView:
     start = START_NS + number * PERIOD_NS
     middle = TimeNs(start + DWELL_NS // 2)
-    placement = Placement(TimeNs(start), TimeNs(start + DWELL_NS), position_m, 0.9, snr_db)
+    placement = Placement(TimeNs(start), TimeNs(start + DWELL_NS), position_m, 0.9, snr_db, fading_db=1.0)
     return DwellView(placement, np.arange(3) + 7 * number, middle, np.zeros((0, 0, 3), np.uint8), 1.0, candidates)

@@ -10,7 +10,8 @@ Several rough poses are refined at once (expectation maximization): each candida
 given the pose; each step then solves for rotation, camera position and the scales of the radar's angles, with the mounting as
 prior. Tolerances shrink from step to step, and the noise level that explains a recording best is kept.
 
-A person who goes from place to place is seen by the radar and in the images alike, but the echo of many parts that move fades.
+A person who goes from place to place is seen by the radar and in the images alike, but the echo of many parts that move fades,
+and no apex is seen.
 """
 
 from collections.abc import Sequence
@@ -514,19 +515,29 @@ _STEADY_DB, _RAYLEIGH_DB, _FADING_SPREAD = 1.0, 5.57, 0.5
 """How far the echo of one surface scatters, by the receiver's noise, and that of many which move (Rayleigh's distribution of
 amplitudes, in decibels); and the standard deviation of the logarithm of both."""
 
+_WITHOUT_APEX, _APEX_SHARE, _CHANCE_APEX = 0.3, 0.6, 0.05
+"""Share of the reflectors that show no apex anywhere, such as boards; of the places of the others that show one; and of those of
+people, by chance."""
+
 _PRESENT = 0.5
 
 
 def reflector_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
-    """Return the log-odds that what stood there is a reflector and not a person, whose echo fades; infinite where it is unknown.
+    """Return the log-odds that what stood there is a reflector and not a person, whose echo fades and who shows no apex.
+
+    Apexes count only where the radar reports no strength: most that are right are too small to be seen, or none.
 
     Args:
-        views: as the agreement was found for.
+        views: as the agreement was found for, without a click.
         agreement: the dwells with a probable candidate count.
     """
-    shown = agreement.probability.max(axis=1) >= _PRESENT
+    shown = np.flatnonzero(agreement.probability.max(axis=1) >= _PRESENT)
     fading_db = np.array([view.placement.fading_db for view in views])[shown]
     known_db = fading_db[np.isfinite(fading_db)]
+    if not len(known_db):
+        apexes = [views[i].candidates[agreement.likeliest[i]].has_apex for i in shown.tolist()]
+        each = np.where(apexes, _APEX_SHARE / _CHANCE_APEX, (1.0 - _APEX_SHARE) / (1.0 - _CHANCE_APEX))
+        return _BEFORE + float(np.log(_WITHOUT_APEX + (1.0 - _WITHOUT_APEX) * each.prod()))
     if len(known_db) < _LEAST_SEEN:
         return float("inf")
     steady, faded = np.log([_STEADY_DB, _RAYLEIGH_DB])

@@ -373,6 +373,18 @@ def test_an_echo_that_fades_is_a_persons_until_somebody_clicks(fading_db, is_ref
     assert proposals_of(views, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked
 
 
+@pytest.mark.parametrize(("apexes", "is_reflector"), [(0, False), (3, True)])
+def test_without_strengths_apexes_tell_a_reflector_until_somebody_clicks(apexes, is_reflector):
+    drawn = draw_views(1, Drawing(count=6, first_share=1.0, listed_share=1.0))
+    views = [
+        replace(view, candidates=tuple(replace(one, has_apex=True) for one in view.candidates)) if k < apexes else view
+        for k, view in enumerate(faded(drawn, float("nan")))
+    ]
+    found = proposals_of(views, CAMERA, OPTIONS)
+    assert bool(found.ranked) == is_reflector
+    assert proposals_of(views, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked
+
+
 @pytest.mark.slow
 def test_the_width_is_found_far_beyond_chance_where_images_and_radar_belong_together():
     few = Drawing(count=6)
