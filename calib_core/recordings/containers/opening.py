@@ -290,4 +290,5 @@ def _what_is_it(head: bytes) -> str:
     for magic, (name, command) in _PACKED.items():
         if head.startswith(magic):
             return f"the file is compressed with {name}; decompress it first: {command}"
-    return f"not a recording (it begins with {head[:8]!r}); {_KINDS}"
+    begins = f"'{head[:8].decode()}'" if head[:8].isascii() and head[:8].decode().isprintable() else head[:8].hex()
+    return f"not a recording (it begins with {begins}); {_KINDS}"

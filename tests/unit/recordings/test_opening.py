@@ -150,7 +150,7 @@ def test_a_missing_file_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"hello world, I am text", "not a recording (it begins with b'hello wo')"),
+        (b"hello world, I am text", "not a recording (it begins with 'hello wo')"),
         (b"\x28\xb5\x2f\xfd" + bytes(20), "the Zstandard-compressed file cannot be decompressed"),
         (b"PK\x03\x04" + bytes(20), "zip"),
     ],
