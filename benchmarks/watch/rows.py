@@ -16,19 +16,22 @@ from calib_core.watching.watching import stretches
 
 __all__ = ["simulated_rows"]
 
+_WIDTH_PX = 960  # of rendered images
 
-class _Radar:
-    """A simulated recording without its images."""
 
-    def __init__(self, recording: SimulatedRecording) -> None:
+class _Recording:
+    """A simulated recording, with its images or without."""
+
+    def __init__(self, recording: SimulatedRecording, *, rendered: bool) -> None:
         self.name = "simulated"
         self.scans = recording.scans
         self.radar_times: TimesNs = self.scans.times_ns
-        self.image_times: TimesNs = self.scans.times_ns[:0]
+        self.image_times: TimesNs = np.asarray(recording.stage.frame_times.header_ns)[: None if rendered else 0]
+        self._recording = recording
 
     def image(self, index: int) -> np.ndarray:
-        """Return no image: there are none."""
-        raise IndexError(index)
+        """Render an image."""
+        return self._recording.image(index, np.random.default_rng(index))
 
     def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
         """Return the scans between two times."""
@@ -56,7 +59,7 @@ def _detected(boxes: Boxes, rng: np.random.Generator, size_px: tuple[int, int]) 
     return Boxes(tuple(frames), "simulated", boxes.image_size_px)
 
 
-def simulated_rows(kind: str, seed: int, seconds: int, folder: Path | None) -> TrafficRows:
+def simulated_rows(kind: str, seed: int, seconds: int, folder: Path | None, *, rendered: bool = False) -> TrafficRows:
     """Return the rows of a recording; those in the folder are read.
 
     Args:
@@ -64,8 +67,10 @@ def simulated_rows(kind: str, seed: int, seconds: int, folder: Path | None) -> T
         seed: of everything.
         seconds: of traffic.
         folder: where rows are kept.
+        rendered: find the boxes in rendered images, in place of drawing them around what is simulated.
     """
-    path = None if folder is None else folder / f"{kind.replace('/', '-')}-{seed}-{seconds}.npz"
+    name = f"{kind.replace('/', '-')}-{seed}-{seconds}{'-rendered' if rendered else ''}.npz"
+    path = None if folder is None else folder / name
     if path is not None and path.exists():
         with np.load(path) as kept:
             return TrafficRows(
@@ -74,11 +79,15 @@ def simulated_rows(kind: str, seed: int, seconds: int, folder: Path | None) -> T
     preset, _, radar = kind.partition("/")
     options = PRESETS[preset]
     traffic = replace(options.traffic, duration_s=float(seconds))
-    recording = simulate(replace(options, radar=radar, seed=seed, traffic=traffic))
+    size = {"width_px": _WIDTH_PX, "height_px": _WIDTH_PX * 9 // 16} if rendered else {}
+    recording = simulate(replace(options, radar=radar, seed=seed, traffic=traffic, **size))
     camera = recording.camera
-    boxes = _detected(true_boxes(recording), np.random.default_rng([seed, 5]), (camera.width_px, camera.height_px))
+    boxes = None
+    if not rendered:
+        boxes = _detected(true_boxes(recording), np.random.default_rng([seed, 5]), (camera.width_px, camera.height_px))
     watched = Watched(recording.camera_from_radar, camera, RadarErrors())
-    found = [one.rows for one in stretches(_Radar(recording), watched, boxes) if one.rows is not None]
+    given = _Recording(recording, rendered=rendered)
+    found = [one.rows for one in stretches(given, watched, boxes, moving=rendered) if one.rows is not None]
     rows = TrafficRows.joined(found)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -70,9 +70,9 @@ class Judged:
     size_z: np.ndarray
 
 
-def judged(kind: str, seed: int, seconds: int, folder: Path | None) -> Judged:
+def judged(kind: str, seed: int, seconds: int, folder: Path | None, rendered: bool) -> Judged:
     """Simulate a recording, or read its rows from a folder, and watch it."""
-    watches = _parts(simulated_rows(kind, seed, seconds, folder), seconds)
+    watches = _parts(simulated_rows(kind, seed, seconds, folder, rendered=rendered), seconds)
     z = {window: np.concatenate([one.z(window) for one in watches]) for window in (*_WINDOWS_S, 0)}
     passages = float(np.mean([sum(one.model.passages) for one in watches]))
     seen = np.array([[one.seen_after(axis, turn_deg) for _, axis, turn_deg in TURNS] for one in watches])
@@ -185,7 +185,14 @@ class _Part:
 
 
 def report(
-    seed: int, seconds: int, count: int, folder: Path | None, processes: int, resampled_hours: float
+    seed: int,
+    seconds: int,
+    count: int,
+    folder: Path | None,
+    processes: int,
+    *,
+    resampled_hours: float,
+    rendered: bool,
 ) -> Iterator[str]:
     """Yield what is found in a number of recordings, each with a seed of its own, and in hours of passages drawn from them."""
     kinds = [KINDS[(number - _FIRST_SEED) % len(KINDS)] for number in range(seed, seed + count)]
@@ -199,7 +206,7 @@ def report(
         yield f"{resampled_hours:g} h of {distinct} passages, drawn again and again: {alarms:.0f} alarms, largest z {largest:.1f}"
         return
     with ProcessPoolExecutor(processes) as pool:
-        for one in pool.map(judged, *given):
+        for one in pool.map(judged, *given, [rendered] * count):
             found.append(one)
             print(f"{len(found)} of {count}: {one.kind}, {one.alarms} alarms", file=sys.stderr, flush=True)
     yield f"{count} recordings of {seconds} s, each third watched with a baseline of the others ({seconds * 2 // 3} s)"
