@@ -184,6 +184,7 @@ def baseline_of(found: Sequence[Stretch], *, calibration_sha256: str, recording:
             "recording in which it stands still"
         )
     still = [one.scans for one in found if one.still and len(one.scans)][:_BASELINE_STRETCHES]
+    last = found[-1].scans.times_ns
     places = still_places(RadarScans.joined(still)) if still else None
     if not backgrounds and not rows and not places:
         raise NoAnswerError(
@@ -195,7 +196,7 @@ def baseline_of(found: Sequence[Stretch], *, calibration_sha256: str, recording:
         calibration_sha256,
         recording[:200] or "recording",
         found[0].start,
-        found[-1].end,
+        TimeNs(int(last[-1])) if len(last) else found[-1].end,
         (camera.width_px, camera.height_px),
         [encoded(image) for image in backgrounds],
         places if places else None,
