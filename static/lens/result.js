@@ -96,7 +96,7 @@ export function parameters(camera) {
 }
 
 /** @param {number|null} value */
-const px = (value) => (value === null ? "–" : value.toFixed(3));
+const px = (value) => (value === null ? "–" : value.toFixed(2));
 
 /** @param {import("../messages.js").LensResult} found */
 function figures(found) {
