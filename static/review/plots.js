@@ -7,7 +7,7 @@ import { growth, smallFont, themeColour } from "../base/colours.js";
 import { hideTip, make, showTip } from "../base/notices.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
-/** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */
+/** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: () => string}} Mark */
 /** @typedef {{label: string, low: number, high: number, words?: (value: number) => string}} Axis */
 /** @typedef {{marks: Mark[], x: Axis, y: Axis, bar: number, limit: number|null, empty: string}} Content */
 /** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void, line?: (value: number) => void}} Listener */
@@ -224,7 +224,7 @@ export class Plot {
   moved(event) {
     if (!this.press) {
       const mark = this.near(event);
-      if (mark) showTip(mark.text, event.clientX, event.clientY + 10);
+      if (mark) showTip(mark.text(), event.clientX, event.clientY + 10);
       else hideTip();
       return this.listener.hover(mark);
     }

@@ -14,7 +14,7 @@ import { contactSheet, drawSheet, markSheet, nextUnreviewed } from "./sheet.js";
 /** @typedef {import("./plots.js").Mark} Mark */
 /** @typedef {import("./plots.js").Content} Content */
 /** @typedef {import("./plots.js").Kind} Kind */
-/** A pair that is drawn. @typedef {{click: Click, kind: Kind, right: number, down: number, length: number, order: number, influence: number|null, heldOut: number|null}} Row */
+/** A pair that is drawn. @typedef {{click: Click, kind: Kind, right: number, down: number, length: number}} Row */
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page-review"));
 const check = /** @type {HTMLElement} */ (document.getElementById("page-check"));
@@ -95,7 +95,7 @@ export const visible = () => !check.hidden;
 /** @param {Review} message */
 export function takeReview(message) {
   review = message;
-  draw();
+  wordsLine.textContent = said(review.words);
 }
 
 /** @param {import("../messages.js").PairReview} message */
@@ -124,7 +124,6 @@ function drawAll() {
   pending = 0;
   if (!visible()) return;
   highlight.selected = state.selected;
-  wordsLine.textContent = review ? said(review.words) : "";
   drawFilters();
   drawPlots();
   drawPair();
@@ -145,7 +144,7 @@ function drawMarks() {
   const open = worst.filter(({ click, kind }) => marked.has(click.id) && kind !== "excluded" && !reviewed.includes(click.id)).length;
   left.textContent = worst.length ? `${marked.size} of ${worst.length} above ${Number.isFinite(line()) ? digits(line()) : "–"} px, ${open} to review` : "No marks to review yet";
   next.disabled = !open;
-  const marks = worst.map((row, index) => ({ ids: [row.click.id], x: index + 0.5, y: row.length, kind: /** @type {Kind} */ (marked.has(row.click.id) ? "outlier" : row.kind), text: told(row) }));
+  const marks = worst.map((row, index) => ({ ids: [row.click.id], x: index + 0.5, y: row.length, kind: /** @type {Kind} */ (marked.has(row.click.id) ? "outlier" : row.kind), text: () => told(row) }));
   const high = 1.08 * Math.max(1, ...marks.map((mark) => mark.y));
   bars.show({ marks, x: { label: "marks; drag the line", low: 0, high: Math.max(1, worst.length) }, y: { label: "residual [px]", low: 0, high }, bar: 1, limit: Number.isFinite(line()) ? Math.min(line(), high) : null, empty: EMPTY }, highlight);
   drawSheet(worst, marked, highlight);
@@ -153,12 +152,10 @@ function drawMarks() {
 
 /** All pairs with a reprojection, in order of time. @returns {Row[]} */
 function rows() {
-  const more = new Map((review?.rows ?? []).map((row) => [row[0], row]));
   const drawn = clicks().filter((click) => click.projected_px && click.state !== "pending" && click.state !== "unpaired");
-  return drawn.sort((a, b) => a.frame - b.frame).map((click, index) => {
+  return drawn.sort((a, b) => a.frame - b.frame).map((click) => {
     const [u, v] = /** @type {[number, number]} */ (click.projected_px);
-    const [, influence, heldOut] = more.get(click.id) ?? ["", null, null];
-    return { click, kind: kindOf(click), right: u - click.u_px, down: v - click.v_px, length: click.residual_px ?? 0, order: index + 1, influence, heldOut };
+    return { click, kind: kindOf(click), right: u - click.u_px, down: v - click.v_px, length: click.residual_px ?? 0 };
   });
 }
 
@@ -237,7 +234,7 @@ const EMPTY = "no clicks to show";
 
 /** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @param {(value: number) => string} [words] @returns {Content} */
 function scatter(drawn, label, at, words) {
-  const marks = drawn.filter((row) => at(row) !== null).map((row) => ({ ids: [row.click.id], x: Number(at(row)), y: row[shown.part], kind: row.kind, text: told(row) }));
+  const marks = drawn.filter((row) => at(row) !== null).map((row) => ({ ids: [row.click.id], x: Number(at(row)), y: row[shown.part], kind: row.kind, text: () => told(row) }));
   const limitPx = state.view?.residual_limit_px ?? null;
   const usual = drawn.filter((row) => row.kind === "agreeing").map((row) => Math.abs(row[shown.part]));
   const most = 1.12 * Math.max(1e-3, ...(usual.length ? usual : drawn.map((row) => Math.abs(row[shown.part]))));
@@ -250,7 +247,7 @@ function hovered(mark) {
   const ids = mark?.ids ?? [];
   if (ids.length === highlight.hovered.size && ids.every((id) => highlight.hovered.has(id))) return;
   highlight.hovered = new Set(ids);
-  readout.textContent = mark?.text ?? brushedText();
+  readout.textContent = mark?.text() ?? brushedText();
   redraw();
 }
 
@@ -307,7 +304,8 @@ function spread(values) {
 function told(row) {
   const { click } = row;
   const side = (/** @type {number|null} */ angle, /** @type {string} */ plus, /** @type {string} */ minus) => `${Math.abs(angle ?? 0).toFixed(1)}° ${(angle ?? 0) >= 0 ? plus : minus}`;
-  const more = [row.heldOut === null ? "" : `leave-one-out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
+  const [, influence = null, heldOut = null] = review?.rows.find(([id]) => id === click.id) ?? [];
+  const more = [heldOut === null ? "" : `leave-one-out ${digits(heldOut)} px`, influence === null ? "" : `influence ${digits(influence)} σ`];
   return [`${nameOf(click.id)}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
 }
 
