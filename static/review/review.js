@@ -124,10 +124,15 @@ function drawAll() {
   pending = 0;
   if (!visible()) return;
   highlight.selected = state.selected;
+  drawMarks();
+  requestAnimationFrame(drawBelow);
+}
+
+/** Draw what is below the marks, a screen frame later: nobody waits for it. */
+function drawBelow() {
   drawFilters();
   drawPlots();
   drawPair();
-  drawMarks();
 }
 
 /** The marks above the line. */
