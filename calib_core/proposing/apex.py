@@ -1,28 +1,82 @@
 """The apex of a trihedral corner reflector near a given pixel, with its own covariance, or the reason why there is none.
 
 Three sheets meet in the apex, so the image shows three sectors of different brightness, each below 180 deg. Discs of several
-sizes propose pixels that look so (`score_sectors`), and a fit with blurred boundaries gives the apex below a pixel. The given
-pixel limits the search and enters no estimate. An edge, a line, the tip of a sheet, a T or an X leaves too much, or has other
-angles.
+sizes propose pixels that look so (`score_sectors`), a fit with blurred boundaries gives the apex below a pixel (`fit_sectors`),
+and the disc grows while the fit holds. The given pixel limits the search and enters no estimate. `is_corner` says which fits of
+three sectors show the inner corner of a reflector, and not an edge, a line, a tip, an X or texture.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from calib_core.arrays import Indices, Matrix22, Values, Vector2, Vector3, freeze
 
-_SIZES = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
+_PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
 """How much the image is reduced, and the radius of the disc there [px]."""
+
+_GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))
 _MARGIN_PX = 48
+_LEAST_SCORE = 0.5
+
 _TRIED = 3
 """How many places are fitted."""
-_SAME, _SAME_PX = 0.4, 2.5
-"""How far apart two peaks of one place lie at most: in radii of the larger disc, and what is always one."""
+
+_WORSE = 1.3
+"""A larger disc may leave this much more than the one before."""
+
 _RIVAL = 0.6
 """A second corner with this share of the first one's contrast makes the choice open."""
+
+_FITTED, _BLUR, _MOVED, _FLOOR_PX2 = 3.4, 0.009, 0.14, 0.015
+"""How the covariance follows from the fit's, the blur's square, the square of the last move, and what is always added: fitted
+once to 560 simulated images (`python -m benchmarks.apex` measures the coverage on others)."""
+
+_FEW_PIXELS_PX, _FEW_PIXELS_PX2 = 4.0, 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectorFit:
+    """A fit, in the pixels of the image it was made in.
+
+    Attributes:
+        apex_px: (2,) where the sectors meet.
+        starts_rad: (3,) directions of the boundaries, from x towards y, ascending.
+        blur_px: standard deviation of the boundaries' blur.
+        radius_px: of the disc.
+        residual_grey: standard deviation of what the fit leaves.
+        explained: share of the variance in the disc that it explains.
+        step_grey: the smallest difference of grey levels across a boundary, half-way out.
+        least_step_grey: the smallest anywhere along the boundaries; 0 if one changes its sign.
+        slope_grey: the largest change of grey levels within a sector, over one radius.
+        covariance_px2: (2, 2) of the apex if the residuals were independent.
+    """
+
+    apex_px: Vector2
+    starts_rad: Vector3
+    blur_px: float
+    radius_px: float
+    residual_grey: float
+    explained: float
+    step_grey: float
+    least_step_grey: float
+    slope_grey: float
+    covariance_px2: Matrix22
+
+    def __post_init__(self) -> None:
+        freeze(self, apex_px=(2,), starts_rad=(3,), covariance_px2=(2, 2))
+
+    @property
+    def widths_rad(self) -> Values:
+        """The angles of the three sectors."""
+        return np.diff(self.starts_rad, append=self.starts_rad[0] + 2.0 * np.pi)
+
+    @property
+    def contrast(self) -> float:
+        """The smallest step, in standard deviations of what the fit leaves."""
+        return self.step_grey / self.residual_grey
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,19 +133,22 @@ class _Reduced:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
-    """A pixel of the full image around which a disc of a reduced one shows three sectors."""
-
+class _Proposal:
     score: float
     pixel_px: Vector2
     starts_rad: Vector3
-    level: _Reduced
+    factor: int
     radius_px: float
 
-    @property
-    def size_px(self) -> float:
-        """Radius of the disc in the full image."""
-        return self.level.factor * self.radius_px
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A fit in pixels of the full image, and how far the apex moved when the disc last grew."""
+
+    fit: SectorFit
+    pixel_px: Vector2
+    factor: int
+    moved_px: float
 
 
 def find_apex(
@@ -109,29 +166,27 @@ def find_apex(
     if not (np.all(near_px >= -reach_px) and np.all(near_px <= np.array(image.shape[1::-1]) + reach_px)):
         return NoApex("the given pixel lies outside the image")
     levels = _reduced(image, near_px, reach_px)
-    seen = [place for size in _SIZES for place in _peaks(levels[size[0]], near_px, reach_px, size[1])]
-    places = _places(seen)
-    found = [apex for place in places if (apex := _fitted(place)) is not None]
-    inside = [apex for apex in found if float(np.hypot(*(apex.pixel_px - near_px))) <= reach_px]
+    proposals = _proposals(levels, near_px, reach_px)
+    found = [one for proposal in proposals if (one := _grown(levels, proposal)) is not None]
+    inside = [one for one in found if float(np.hypot(*(one.pixel_px - near_px))) <= reach_px]
+    inside.sort(key=lambda one: -one.fit.contrast)
     if not inside:
-        what = "no three sheets that meet in one point" if places else "nothing with three sheets"
-        return NoApex(f"{what} within {reach_px:.0f} px")
-    best = max(inside, key=lambda apex: apex.contrast)
-    rivals_px = [apex.pixel_px - best.pixel_px for apex in inside if apex.contrast >= _RIVAL * best.contrast]
-    apart_px = float(np.hypot(*np.transpose(rivals_px)).max())
-    if apart_px > 1.5:
+        seen = "no three sheets that meet in one point" if proposals else "nothing with three sheets"
+        return NoApex(f"{seen} within {reach_px:.0f} px")
+    best, *others = inside
+    apart_px = max(
+        (float(np.hypot(*(rival.pixel_px - best.pixel_px))) for rival in _rival_corners(best, others)), default=0.0
+    )
+    if apart_px > 0.0:
         return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well", several=True)
-    radius_px = max([best.radius_px, *(place.size_px for place in seen if _lies_at(place, best.pixel_px))])
+    radius_px = best.factor * best.fit.radius_px
     if size_px is not None and radius_px > size_px:
         return NoApex(f"the corner reaches {radius_px:.0f} px far, beyond a reflector of {size_px:.0f} px")
-    return replace(best, radius_px=radius_px)
+    return Apex(best.pixel_px, _covariance(best), best.fit.contrast, radius_px)
 
 
 def _reduced(image: np.ndarray, near_px: Vector2, reach_px: float) -> dict[int, _Reduced]:
-    """Cut out what the search can need, on a grid that does not depend on where it begins, and reduce it.
-
-    Grey levels are squared, which undoes most of a camera's gamma: blur is symmetric in linear light only.
-    """
+    """Cut out what the search can need, on a grid that does not depend on where it begins, and reduce it."""
     import cv2
 
     height, width = image.shape[:2]
@@ -141,34 +196,34 @@ def _reduced(image: np.ndarray, near_px: Vector2, reach_px: float) -> dict[int, 
     columns = np.clip(np.arange(left, left + side), 0, width - 1)
     part = image[rows[:, None], columns]
     grey = (part if part.ndim == 2 else cv2.cvtColor(part, cv2.COLOR_BGR2GRAY)).astype(np.float32)
-    grey = grey * grey / np.float32(255.0)
     corner_px = np.array([left, top], dtype=np.float64)
-    return {
-        factor: _Reduced(
-            cv2.resize(grey, (side // factor,) * 2, interpolation=cv2.INTER_AREA),
-            factor,
-            corner_px + 0.5 * (factor - 1),
-        )
-        for factor in (1, 2, 4)
-    }
+    grey = grey * grey / np.float32(255.0)
+    reduced = {1: _Reduced(grey, 1, corner_px)}
+    for factor in (2, 4):
+        small = cv2.resize(grey, (side // factor, side // factor), interpolation=cv2.INTER_AREA)
+        reduced[factor] = _Reduced(small, factor, corner_px + 0.5 * (factor - 1))
+    return reduced
 
 
-def _places(seen: Sequence[_Place]) -> list[_Place]:
+def _proposals(levels: dict[int, _Reduced], near_px: Vector2, reach_px: float) -> list[_Proposal]:
     """Return the best places, best first, each at the size at which it scores most."""
-    chosen: list[_Place] = []
-    for place in sorted(seen, key=lambda one: -one.score):
-        if len(chosen) < _TRIED and not any(_lies_at(place, one.pixel_px, one.size_px) for one in chosen):
-            chosen.append(place)
+    every = [peak for factor, radius_px in _PROPOSING for peak in _peaks(levels[factor], near_px, reach_px, radius_px)]
+    every.sort(key=lambda one: -one.score)
+    chosen: list[_Proposal] = []
+    for one in every:
+        if len(chosen) == _TRIED:
+            break
+        if all(_are_apart(one, other) for other in chosen):
+            chosen.append(one)
     return chosen
 
 
-def _lies_at(place: _Place, pixel_px: Vector2, size_px: float = 0.0) -> bool:
-    """Return whether a place and another, seen in a disc of some size, are one: peaks of large discs are blunt."""
-    off_px = float(np.hypot(*(place.pixel_px - pixel_px)))
-    return off_px <= max(_SAME_PX, _SAME * max(place.size_px, size_px))
+def _are_apart(proposal: _Proposal, other: _Proposal) -> bool:
+    distance_px = float(np.hypot(*(proposal.pixel_px - other.pixel_px)))
+    return distance_px > max(2.5, 0.4 * max(proposal.factor * proposal.radius_px, other.factor * other.radius_px))
 
 
-def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float) -> Iterator[_Place]:
+def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float) -> Iterator[_Proposal]:
     import cv2
 
     half = int(np.ceil(radius_px))
@@ -181,23 +236,92 @@ def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float)
     for row, column in np.argwhere((scores >= highest) & (scores > _LEAST_SCORE)):
         pixel_px = level.to_full(np.array([column + first[0], row + first[1]], dtype=np.float64))
         if float(np.hypot(*(pixel_px - near_px))) <= reach_px + level.factor:
-            yield _Place(float(scores[row, column]), pixel_px, starts_rad[row, column], level, radius_px)
+            score = float(scores[row, column])
+            yield _Proposal(score, pixel_px, starts_rad[row, column], level.factor, radius_px)
 
 
-_LEAST_SCORE = 0.6
-_CONTRAST, _STEP_GREY, _EXPLAINED = 6.0, 20.0, 0.965
-"""What a corner shows at least: steps between two sheets, in standard deviations of what the fit leaves and in linear grey levels
-of 255; and the share of the variance in the disc that three sheets explain."""
-_WIDTHS_DEG = (85.0, 152.0)
-"""Angles of a sheet: an edge or the tip of a sheet has 180 deg or more."""
-_HALF_TURN = (-0.90, -0.15)
-"""Correlation of the disc with itself turned by 180 deg: -1 for a straight edge, 1 for a line or the X of a checkerboard."""
-_MOST_BLUR, _ANY_BLUR = 0.3, 0.35
-"""Largest blur of a corner, and of a fit, relative to the radius of the disc: smooth shading has no edges."""
-_FITTED, _BLUR, _FLOOR_PX2 = 3.4, 0.009, 0.03
-"""How the covariance follows from the fit's, the square of the blur, and what is always added: fitted once to simulated images
-(`python -m benchmarks.apex` measures the coverage on others)."""
-_FIRST_BLUR_PX, _LEAST_BLUR_PX = 0.7, 0.35
+def _grown(levels: dict[int, _Reduced], proposal: _Proposal) -> _Found | None:
+    """Fit at the proposed size, then with larger discs as long as three sectors explain them as well.
+
+    Returns:
+        The largest that shows a corner; None if none does.
+    """
+    at = _fitted(levels, proposal.factor, proposal.pixel_px, proposal.starts_rad, proposal.radius_px, None)
+    found = _checked(levels, proposal, at)
+    size_px = proposal.factor * proposal.radius_px
+    for factor, radius_px in _GROWING:
+        if at is None or not _is_within(at.fit, _LOOSE):
+            break
+        if factor * radius_px <= size_px:
+            continue
+        larger = _fitted(levels, factor, at.pixel_px, at.fit.starts_rad, radius_px, at)
+        if larger is None or larger.fit.residual_grey > _WORSE * at.fit.residual_grey + 0.3:
+            break
+        if not _angles_within(larger.fit, _strict_at(larger.fit.radius_px)):
+            return None  # it fits as well, and knows the angles better
+        if larger.moved_px > max(0.5, 4.0 * _sigma_px(at)):
+            break
+        at = larger
+        found = _checked(levels, proposal, at) or found
+    return found
+
+
+def _checked(levels: dict[int, _Reduced], proposal: _Proposal, at: _Found | None) -> _Found | None:
+    """Return a fit that shows a corner, else None."""
+    if at is None:
+        return None
+    half_turn = half_turn_correlation(levels[at.factor].grey, at.fit)
+    return at if is_corner(at.fit, proposal.score, half_turn) else None
+
+
+def _fitted(
+    levels: dict[int, _Reduced],
+    factor: int,
+    pixel_px: Vector2,
+    starts_rad: Vector3,
+    radius_px: float,
+    before: _Found | None,
+) -> _Found | None:
+    level = levels[factor]
+    blur_px = {} if before is None else {"blur_px": max(0.35, before.fit.blur_px * before.factor / factor)}
+    fit = fit_sectors(level.grey, level.of_full(pixel_px), starts_rad, radius_px, **blur_px)
+    if fit is None:
+        return None
+    full_px = level.to_full(fit.apex_px)
+    return _Found(fit, full_px, factor, 0.0 if before is None else float(np.hypot(*(full_px - before.pixel_px))))
+
+
+def _rival_corners(best: _Found, others: list[_Found]) -> list[_Found]:
+    """Return other corners that fit about as well, and are not the same one."""
+    return [
+        one
+        for one in others
+        if one.fit.contrast >= _RIVAL * best.fit.contrast and float(np.hypot(*(one.pixel_px - best.pixel_px))) > 1.5
+    ]
+
+
+def _sigma_px(found: _Found) -> float:
+    return found.factor * float(np.sqrt(0.5 * np.trace(found.fit.covariance_px2)))
+
+
+def _covariance(found: _Found) -> Matrix22:
+    """Widen the fit's covariance by what sheets, lens and compression add."""
+    fit, factor = found.fit, found.factor
+    added_px2 = _FLOOR_PX2 + _BLUR * (factor * fit.blur_px) ** 2 + _MOVED * found.moved_px**2
+    if fit.radius_px < _FEW_PIXELS_PX:
+        added_px2 += _FEW_PIXELS_PX2
+    return np.asarray(_FITTED * factor**2 * fit.covariance_px2 + added_px2 * np.eye(2))
+
+
+_SLOPES_FROM_PX = 5.0
+"""Smaller discs have too few pixels to tell a slope within a sector from the boundaries."""
+
+_FIRST_BLUR_PX = 0.7
+_LEAST_BLUR_PX = 0.35
+
+_MOST_BLUR = 0.35
+"""Largest blur, relative to the radius of the disc."""
+
 _ITERATIONS = 12
 _STEP_LIMIT = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
 _ENOUGH_PX = 0.02
@@ -213,11 +337,12 @@ class _Disc:
     x: Values
     y: Values
     grey: Values
+    radius_px: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Linearized:
-    """The fit at one state (x, y, three directions, blur): what it leaves, and derivatives with the levels (3,) solved for."""
+    """The fit at one state (x, y, three directions, blur): what it leaves, and derivatives with the levels solved for."""
 
     levels: Values
     left: Values
@@ -228,52 +353,44 @@ class _Linearized:
         return float(self.left @ self.left)
 
 
-def _fitted(place: _Place) -> Apex | None:
-    """Fit apex, directions, blur and grey levels to the disc around a place; None if they show no corner."""
-    level, radius_px = place.level, place.radius_px
-    at_px = level.of_full(place.pixel_px)
-    disc = _disc(level.grey, at_px, radius_px)
+def fit_sectors(
+    grey: np.ndarray, apex_px: Vector2, starts_rad: Vector3, radius_px: float, blur_px: float = _FIRST_BLUR_PX
+) -> SectorFit | None:
+    """Fit apex, directions, blur and grey levels to the disc around a first apex.
+
+    Args:
+        grey: (h, w) the image.
+        apex_px: (2,) where to begin; the disc is centred on the nearest pixel.
+        starts_rad: (3,) where the sectors begin, ascending.
+        radius_px: of the disc.
+        blur_px: where to begin.
+
+    Returns:
+        None if the disc leaves the image or the apex leaves the disc.
+    """
+    disc = _disc(grey, apex_px, radius_px)
     if disc is None:
         return None
-    state = np.array([*(at_px - disc.middle_px), *place.starts_rad, _FIRST_BLUR_PX])
-    at, damping = _linearize(disc, state), 1e-3
+    state = np.array([*(np.asarray(apex_px) - disc.middle_px), *starts_rad, blur_px])
+    at = _linearize(disc, state)
+    damping = 1e-3
     for _ in range(_ITERATIONS):
         normal = at.jacobian @ at.jacobian.T
         damped = normal + damping * np.diag(np.diag(normal) + 1e-9)
         step = np.clip(np.linalg.solve(damped, at.jacobian @ at.left), -_STEP_LIMIT, _STEP_LIMIT)
-        moved = state + step
-        moved[5] = np.clip(moved[5], _LEAST_BLUR_PX, _ANY_BLUR * radius_px)
-        new = _linearize(disc, moved)
+        new_state = state + step
+        new_state[5] = np.clip(new_state[5], _LEAST_BLUR_PX, _MOST_BLUR * radius_px)
+        new = _linearize(disc, new_state)
         if new.cost >= at.cost:
             damping *= 6.0
+            if damping > 1e3:
+                break
             continue
-        state, at, damping = moved, new, damping / 4.0
-        if float(np.abs(step[:2]).max()) < _ENOUGH_PX:
+        settled = float(np.abs(new_state - state)[:2].max()) < _ENOUGH_PX
+        state, at, damping = new_state, new, damping / 4.0
+        if settled:
             break
-    return _corner(place, disc, state, at)
-
-
-def _corner(place: _Place, disc: _Disc, state: Values, at: _Linearized) -> Apex | None:
-    """Return the apex of a fit that shows three sheets which meet in one point."""
-    factor = place.level.factor
-    variance = at.cost / max(len(disc.grey) - len(at.levels) - len(state), 1) + _ROUNDING_GREY2
-    step_grey = float(np.abs(at.levels - at.levels[_LAST]).min())
-    contrast = step_grey / float(np.sqrt(variance))
-    grey = disc.grey - disc.grey.mean()
-    total = max(float(grey @ grey), 1e-9)
-    explained, half_turn = 1.0 - at.cost / total, float(grey @ grey[::-1]) / total
-    widths_deg = np.rad2deg(np.diff(state[2:5], append=state[2] + 2.0 * np.pi))
-    within = _WIDTHS_DEG[0] <= widths_deg.min() and widths_deg.max() <= _WIDTHS_DEG[1]
-    within = (
-        within and float(np.hypot(state[0], state[1])) <= place.radius_px and state[5] <= _MOST_BLUR * place.radius_px
-    )
-    within = within and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1]
-    if not (within and contrast >= _CONTRAST and step_grey >= _STEP_GREY and explained >= _EXPLAINED):
-        return None
-    added_px2 = _FLOOR_PX2 + _BLUR * (factor * state[5]) ** 2
-    fitted = variance * np.linalg.inv(at.jacobian @ at.jacobian.T + 1e-9 * np.eye(6))[:2, :2]
-    covariance_px2 = _FITTED * factor**2 * fitted + added_px2 * np.eye(2)
-    return Apex(place.level.to_full(disc.middle_px + state[:2]), covariance_px2, contrast, place.size_px)
+    return _sector_fit(disc, state, at)
 
 
 def _disc(grey: np.ndarray, apex_px: Vector2, radius_px: float) -> _Disc | None:
@@ -285,12 +402,8 @@ def _disc(grey: np.ndarray, apex_px: Vector2, radius_px: float) -> _Disc | None:
     x, y = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
     inside = x * x + y * y <= radius_px * radius_px
     levels = grey[row - half : row + half + 1, column - half : column + half + 1][inside]
-    return _Disc(
-        np.array([column, row], dtype=np.float64),
-        x[inside].astype(float),
-        y[inside].astype(float),
-        levels.astype(float),
-    )
+    middle_px = np.array([column, row], dtype=np.float64)
+    return _Disc(middle_px, x[inside].astype(float), y[inside].astype(float), levels.astype(float), radius_px)
 
 
 def _linearize(disc: _Disc, state: Values) -> _Linearized:
@@ -307,18 +420,148 @@ def _linearize(disc: _Disc, state: Values) -> _Linearized:
     before = 1.0 - past[_NEXT]
     products = past * before
     total = products.sum(axis=0) + 1e-9
-    shares = products / total
-    normal = shares @ shares.T + 1e-6 * len(disc.grey) * np.eye(3)
-    levels = np.linalg.solve(normal, shares @ disc.grey)
-    fitted = levels @ shares
-    by_product = (levels[:, None] - fitted) / total
+    basis = shares = products / total
+    sloped = disc.radius_px >= _SLOPES_FROM_PX
+    if sloped:
+        basis = np.concatenate([shares, shares * (disc.x / disc.radius_px), shares * (disc.y / disc.radius_px)])
+    normal = basis @ basis.T
+    normal[np.diag_indices(len(normal))] += 1e-6 * len(disc.grey)
+    levels = np.linalg.solve(normal, basis @ disc.grey)
+    sheets = levels[:3, None]
+    if sloped:
+        sheets = sheets + (levels[3:6, None] * disc.x + levels[6:9, None] * disc.y) / disc.radius_px
+    fitted = levels @ basis
+    by_product = (sheets - fitted) / total
     by_past = by_product * before - (by_product * past)[_LAST]
     by_across = by_past * np.exp(-0.5 * across * across) / (blur * np.sqrt(2.0 * np.pi))
-    jacobian = np.stack(
-        [sin[:, 0] @ by_across, -cos[:, 0] @ by_across, *(-by_across * along), -(by_across * across).sum(axis=0)]
-    )
-    jacobian -= np.linalg.solve(normal, shares @ jacobian.T).T @ shares
+    jacobian = np.empty((6, len(disc.grey)))
+    jacobian[0], jacobian[1] = sin[:, 0] @ by_across, -cos[:, 0] @ by_across
+    jacobian[2:5] = -by_across * along
+    jacobian[5] = -(by_across * across).sum(axis=0)
+    jacobian -= np.linalg.solve(normal, basis @ jacobian.T).T @ basis
     return _Linearized(levels, disc.grey - fitted, jacobian)
+
+
+def _sector_fit(disc: _Disc, state: Values, at: _Linearized) -> SectorFit | None:
+    if float(np.hypot(state[0], state[1])) > disc.radius_px:
+        return None
+    freedom = max(len(disc.grey) - len(at.levels) - len(state), 1)
+    variance = at.cost / freedom + _ROUNDING_GREY2
+    normal = at.jacobian @ at.jacobian.T
+    normal[np.diag_indices(6)] += 1e-9
+    total = float(((disc.grey - disc.grey.mean()) ** 2).sum())
+    near, half_way, far = (_steps(disc, state, at.levels, share) for share in (0.15, 0.6, 0.9))
+    return SectorFit(
+        apex_px=disc.middle_px + state[:2],
+        starts_rad=state[2:5],
+        blur_px=float(state[5]),
+        radius_px=disc.radius_px,
+        residual_grey=float(np.sqrt(variance)),
+        explained=1.0 - at.cost / max(total, 1e-9),
+        step_grey=float(np.abs(half_way).min()),
+        least_step_grey=float(np.where(near * far > 0.0, np.minimum(np.abs(near), np.abs(far)), 0.0).min()),
+        slope_grey=float(np.hypot(at.levels[3:6], at.levels[6:9]).max()) if len(at.levels) == 9 else 0.0,
+        covariance_px2=variance * np.linalg.inv(normal)[:2, :2],
+    )
+
+
+def _steps(disc: _Disc, state: Values, levels: Values, share: float) -> Vector3:
+    """Return the differences of grey levels across the boundaries (3,) at a share of the radius from the apex."""
+    ends = share * disc.radius_px * np.stack([np.cos(state[2:5]), np.sin(state[2:5])], axis=1) + state[:2]
+    sheets = np.tile(levels[:3], (3, 1))
+    if len(levels) == 9:
+        sheets = sheets + ends @ levels[3:].reshape(2, 3) / disc.radius_px
+    return np.array([sheets[k, k] - sheets[k, k - 1] for k in range(3)])
+
+
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """What a fit must show, for discs from a radius on: the smaller the disc, the more often chance looks like a corner.
+
+    Attributes:
+        from_px: the radius [px].
+        contrast: least step between two sheets, in standard deviations of what the fit leaves.
+        least_contrast: the same, at the worst place along a boundary.
+        step_grey: least step [linear grey levels of 255].
+        explained: least share of the variance.
+        narrowest_deg: least angle of a sheet.
+        widest_deg: greatest angle of a sheet: an edge or the tip of a sheet has 180 deg or more.
+        blur: greatest blur, relative to the radius: smooth shading has no edges.
+        score: least score of the proposal.
+    """
+
+    from_px: float
+    contrast: float
+    least_contrast: float
+    step_grey: float
+    explained: float
+    narrowest_deg: float
+    widest_deg: float
+    blur: float
+    score: float
+
+
+_STRICT = (
+    _Limits(12.0, 4.0, 2.5, 8.0, 0.98, 85.0, 157.0, 0.25, 0.50),
+    _Limits(6.0, 4.0, 2.5, 8.0, 0.965, 85.0, 157.0, 0.30, 0.55),
+    _Limits(4.0, 4.0, 2.5, 12.0, 0.94, 85.0, 155.0, 0.25, 0.55),
+    _Limits(0.0, 6.0, 6.0, 16.0, 0.95, 86.0, 152.0, 0.30, 0.60),
+)
+
+_LOOSE = _Limits(0.0, 1.5, 0.0, 2.0, 0.70, 40.0, 170.0, 1.0, 0.0)
+
+_STEEPEST = 2.2
+"""Greatest change within a sheet, relative to the smallest step between two."""
+
+_HALF_TURN = (-0.90, -0.15)
+"""Correlation of a disc with itself turned by 180 deg: -1 for a straight edge, 1 for a line or the X of a checkerboard."""
+
+
+def _strict_at(radius_px: float) -> _Limits:
+    return next(one for one in _STRICT if radius_px >= one.from_px)
+
+
+def is_corner(fit: SectorFit, score: float, half_turn: float) -> bool:
+    """Return whether a fit shows three sheets that meet in one point.
+
+    Args:
+        fit: the fit.
+        score: of the proposal that it began with.
+        half_turn: the correlation of its disc with itself turned by 180 deg.
+    """
+    limits = _strict_at(fit.radius_px)
+    steady = fit.slope_grey <= _STEEPEST * fit.step_grey
+    return steady and score >= limits.score and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1] and _is_within(fit, limits)
+
+
+def _is_within(fit: SectorFit, limits: _Limits) -> bool:
+    return bool(
+        fit.contrast >= limits.contrast
+        and fit.least_step_grey >= limits.least_contrast * fit.residual_grey
+        and fit.step_grey >= limits.step_grey
+        and fit.explained >= limits.explained
+        and fit.blur_px <= limits.blur * fit.radius_px
+        and _angles_within(fit, limits)
+    )
+
+
+def _angles_within(fit: SectorFit, limits: _Limits) -> bool:
+    widths_deg = np.rad2deg(fit.widths_rad)
+    return bool(widths_deg.min() >= limits.narrowest_deg and widths_deg.max() <= limits.widest_deg)
+
+
+def half_turn_correlation(grey: np.ndarray, fit: SectorFit) -> float:
+    """Return the correlation of the disc around the fitted apex with itself turned by 180 deg; 1 if it leaves the image.
+
+    Args:
+        grey: (h, w) the image of the fit.
+        fit: the fit.
+    """
+    disc = _disc(grey, fit.apex_px, fit.radius_px)
+    if disc is None:
+        return 1.0
+    levels = disc.grey - disc.grey.mean()
+    return float(levels @ levels[::-1]) / max(float(levels @ levels), 1e-9)
 
 
 _WEDGES = 12
