@@ -174,7 +174,7 @@ def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(full):
 def test_a_recording_without_clicks_and_boxes_judges_nothing_and_each_file_is_named_once(full):
     idle = replace(full, judged=None, inputs=(FILE,))
     words = _words(idle)
-    assert "with radar.bag, in which" in words
+    assert "with radar.bag: without further clicks or boxes, judged by its own pairs" in words
     assert words.count(FILE.sha256) == 1
     assert "this calibration, recording" in words
     assert "judged on radar.bag" in _words(full)
