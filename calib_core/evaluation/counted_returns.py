@@ -716,7 +716,11 @@ def _matches(sightings: Sightings, boxes: Indices, bearings: Bearings | None, ca
 
 
 def _meetings(sightings: Sightings, table: BoxTable, camera: Camera) -> _Meetings:
-    own, boxes = _in_one_frame(sightings, table)
+    return _met(*_in_one_frame(sightings, table), sightings, table, camera)
+
+
+def _met(own: Indices, boxes: Indices, sightings: Sightings, table: BoxTable, camera: Camera) -> _Meetings:
+    """Return some sightings, each with a box."""
     middle, half = _middles(table, camera)
     inverse_range = 1.0 / np.maximum(sightings.range_m[own], 0.5)
     tolerance = _TOLERANCE_RAD + half[boxes] + _TOLERANCE_M * inverse_range
@@ -745,11 +749,10 @@ def boxes_in_bearing(matches: Matches, sightings: Sightings, table: BoxTable, ca
     """
     if matches.bearings is None:
         return matches.boxes
-    meetings = _meetings(sightings, table, camera)
-    own = meetings.some(matches.boxes[meetings.sightings] == meetings.boxes)
-    own = own.some(own.misfits(matches.bearings) <= 1.0)
-    boxes = np.full(len(matches.boxes), -1)
-    boxes[own.sightings] = own.boxes
+    boxes = matches.boxes.copy()
+    matched = np.flatnonzero(boxes >= 0)
+    misfits = _met(matched, boxes[matched], sightings, table, camera).misfits(matches.bearings)
+    boxes[matched[misfits > 1.0]] = -1
     return boxes
 
 

@@ -74,7 +74,7 @@ def not_confident(
     messages = {
         "few-placements": f"the radar shows {shown}, and agreement by chance needs more to be ruled out",
         "no-mounting": "images and radar agree on no mounting; do both belong to the same recording?",
-        "fading": "what stood still may be a person: its echo fades, or the radar reports none and no inner corner is seen",
+        "fading": "what stood still may be a person: its echo fades, or no strength is reported and no inner corner seen",
         "chance": f"{unclear}chance would do {figures}",
         "rival": f"{unclear}another mounting fits {figures}",
         "few-certain": f"{certain} of {shown} are certain enough, and {needed} are needed",

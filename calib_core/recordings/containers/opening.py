@@ -290,5 +290,6 @@ def _what_is_it(head: bytes) -> str:
     for magic, (name, command) in _PACKED.items():
         if head.startswith(magic):
             return f"the file is compressed with {name}; decompress it first: {command}"
-    begins = f"'{head[:8].decode()}'" if head[:8].isascii() and head[:8].decode().isprintable() else head[:8].hex()
+    text = head[:8].decode("latin-1")
+    begins = f"'{text}'" if text.isascii() and text.isprintable() else head[:8].hex()
     return f"not a recording (it begins with {begins}); {_KINDS}"
